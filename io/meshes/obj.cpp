@@ -5,9 +5,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "io/bytes/atomic_file.h"
@@ -247,7 +249,8 @@ void write_faces(AtomicFile& file, const TriangleMesh& mesh, const ObjTexture& t
   }
 }
 
-/// Files beside the OBJ; those that were not there before go again unless kept.
+/// Files beside the OBJ. All lie whole on the disk before the first takes its place; those that
+/// were not there before go again unless kept.
 class Companions {
  public:
   ~Companions() {
@@ -255,13 +258,21 @@ class Companions {
     for (const auto& path : created_) std::filesystem::remove(path, ignored);
   }
   void write(const std::filesystem::path& path, std::string_view bytes) {
-    const bool existed = std::filesystem::exists(path);
-    write_file(path, bytes);
-    if (!existed) created_.push_back(path);
+    files_.push_back({path, std::make_unique<AtomicFile>(path)});
+    files_.back().second->write(bytes);
+    (void)files_.back().second->release_to_library();  // all of it is written now
+  }
+  void commit() {
+    for (const auto& [path, file] : files_) {
+      const bool existed = std::filesystem::exists(path);
+      file->commit();
+      if (!existed) created_.push_back(path);
+    }
   }
   void keep() { created_.clear(); }
 
  private:
+  std::vector<std::pair<std::filesystem::path, std::unique_ptr<AtomicFile>>> files_;
   std::vector<std::filesystem::path> created_;
 };
 
@@ -292,6 +303,8 @@ void write_obj(const std::filesystem::path& path,
     companions.write(path.parent_path() / image_name(path, used.names[i]), used.images[i].jpeg);
   }
   companions.write(materials, materials_text(path, mesh, used));
+  (void)file.release_to_library();
+  companions.commit();
   file.commit();
   companions.keep();
 }

@@ -27,7 +27,8 @@ void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh, cons
 /// STEM.PHOTOGRAPH.jpg. Characters that do not belong in such names become '_'. With an atlas,
 /// PHOTOGRAPH is "atlas", the one picture.
 ///
-/// Images are replaced first and the .obj last; what was not there before a failure is removed.
+/// All files are written before the first of them is replaced, images first and the .obj last; what
+/// was not there before a failure is removed.
 /// \throws Error as above; InvalidInput if the texture does not fit the mesh, see require_texture()
 void write_obj(const std::filesystem::path& path,
                const TriangleMesh& mesh,

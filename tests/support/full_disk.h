@@ -12,13 +12,13 @@
 
 namespace cgs::test {
 
-/// While it lives, no file can grow beyond a few bytes, as if the disk were full.
+/// While it lives, no file can grow beyond so many bytes, as if the disk were full.
 class FullDisk {
  public:
-  FullDisk() : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+  explicit FullDisk(rlim_t bytes = 64) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
     getrlimit(RLIMIT_FSIZE, &old_limit_);
     struct rlimit small = old_limit_;
-    small.rlim_cur = 64;
+    small.rlim_cur = bytes;
     setrlimit(RLIMIT_FSIZE, &small);
   }
   ~FullDisk() {

@@ -241,6 +241,21 @@ TEST(WriteObj, LeavesNeitherFileOnAFullDisk) {
       [](const auto& path) { write_obj(path, test::labelled_sphere(), test::centimetre_frame()); });
 }
 
+// The materials fit on the disk, the mesh does not.
+TEST(WriteObj, ReplacesNoFileUnlessAllAreWritten) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.mtl", "# cgs: of an older mesh\n");
+  test::write_bytes(dir / "a.obj", "# older\n");
+  {
+    const test::FullDisk full(4096);
+    EXPECT_THROW(write_obj(dir / "a.obj", test::labelled_sphere(), test::centimetre_frame()),
+                 IoError);
+  }
+  EXPECT_EQ(test::read_bytes(dir / "a.mtl"), "# cgs: of an older mesh\n");
+  EXPECT_EQ(test::read_bytes(dir / "a.obj"), "# older\n");
+  EXPECT_EQ(test::entries(dir.path()), 2);
+}
+
 TEST(WriteObj, LeavesNeitherFileIfTheMeshCannotTakeItsPlace) {
   const test::TempDir dir;
   std::filesystem::create_directories(dir / "a.obj");  // a folder cannot be replaced by a file
