@@ -269,7 +269,9 @@ SogCount stated_sog_splats(std::string_view bytes, const std::filesystem::path& 
   const SogParts parts(bytes, path);
   const JsonValue meta = parts.meta();
   SogCount out;
-  out.splats = static_cast<uint64_t>(meta.at("count").count());
+  const auto count = meta.find("count");
+  if (!count) return out;  // as of version 1, which reading it tells
+  out.splats = static_cast<uint64_t>(count->count());
   if (const auto harmonics = meta.find("shN")) {
     const auto side = static_cast<uint64_t>(std::min(harmonics->at("bands").count(), 3)) + 1;
     out.harmonics = side * side;

@@ -83,6 +83,10 @@ TEST(SplatReader, TellsSizesOfSogByItsMeta) {
   file.meta["count"] = 2'000'000'000;
   test::write_bytes(dir / "some.sog", file.bytes());
   EXPECT_EQ(stated_splats(dir / "some.sog")->splats, 2u) << "its pictures hold no more";
+  file.meta.erase("count");
+  file.meta.erase("version");
+  test::write_bytes(dir / "some.sog", file.bytes());
+  EXPECT_EQ(stated_splats(dir / "some.sog")->splats, 0u) << "of version 1, which is refused later";
 }
 
 /// Files that other programs made. Counts and corners are those that another reader finds.
