@@ -98,8 +98,10 @@ void reset(std::array<int, 2> size, TileEnd& end, TileSums& sums) {
     }
   }
   for (TilePlane& plane : sums.color) plane.fill(0);
-  sums.depth.fill(0);
-  sums.depth_square.fill(0);
+  if (sums.has_depths) {
+    sums.depth.fill(0);
+    sums.depth_square.fill(0);
+  }
   if (sums.has_weight_squares) sums.weight_square.fill(0);
 }
 
@@ -146,6 +148,7 @@ void draw_tile(const TileSplats& splats, std::array<int, 2> size, TileEnd& end, 
   size_t visited = 0;
   WindowList list;
   list.pairs = has_sixteen_lanes();
+  list.depths = sums.has_depths;
   list.squares = sums.has_weight_squares;
   while (visited < splats.nearest_first.size() && open != 0) {
     const size_t count = std::min(WindowList::kSplats, splats.nearest_first.size() - visited);

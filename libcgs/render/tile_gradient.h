@@ -46,9 +46,10 @@ struct alignas(32) TileEnd {
 /// Sums over the splats at every pixel of a tile.
 struct alignas(32) TileSums {
   std::array<TilePlane, 3> color;
-  TilePlane depth;          ///< Sum w z
-  TilePlane depth_square;   ///< Sum w z^2
+  TilePlane depth;          ///< Sum w z; only drawn if has_depths.
+  TilePlane depth_square;   ///< Sum w z^2; only drawn if has_depths.
   TilePlane weight_square;  ///< Sum w^2; only drawn if has_weight_squares.
+  bool has_depths = false;
   bool has_weight_squares = false;
 };
 

@@ -29,7 +29,8 @@ struct WindowList {
   std::array<uint8_t, kSplats * kWindows + 8> splat_index;  ///< In splats.
   size_t count = 0;
   bool pairs = false;    ///< Each stands for itself and the next.
-  bool squares = false;  ///< Sums of squared weights are drawn as well.
+  bool depths = false;   ///< Sums of depths are drawn as well.
+  bool squares = false;  ///< The same of squared weights.
 };
 
 /// With AVX-512: 16 pixels at once. Windows are pairs, the first of even position.
@@ -87,7 +88,7 @@ inline void add_to(float* plane, typename Lanes::Values a, float b) {
 }
 
 // Blends the windows of a list.
-template <typename Lanes, bool kSquares>
+template <typename Lanes, bool kDepths, bool kSquares>
 void blend_windows(const WindowList& list, int32_t first, TileEnd& end, TileSums& sums) {
   for (size_t n = 0; n < list.count; ++n) {
     const size_t i = list.splat_index[n];
@@ -103,9 +104,11 @@ void blend_windows(const WindowList& list, int32_t first, TileEnd& end, TileSums
     const auto after = before * (1.0f - alpha);
     Lanes::store(after, &end.transmittance[at]);
     for (int c = 0; c < 3; ++c) add_to<Lanes>(&sums.color[c][at], w, s.color[c]);
-    const auto wz = w * s.depth;
-    Lanes::store(Lanes::load(&sums.depth[at]) + wz, &sums.depth[at]);
-    add_to<Lanes>(&sums.depth_square[at], wz, s.depth);
+    if constexpr (kDepths) {
+      const auto wz = w * s.depth;
+      Lanes::store(Lanes::load(&sums.depth[at]) + wz, &sums.depth[at]);
+      add_to<Lanes>(&sums.depth_square[at], wz, s.depth);
+    }
     if constexpr (kSquares) {
       Lanes::store(Lanes::multiply_add(w, w, Lanes::load(&sums.weight_square[at])),
                    &sums.weight_square[at]);
@@ -119,8 +122,10 @@ void blend_windows(const WindowList& list, int32_t first, TileEnd& end, TileSums
 
 template <typename Lanes>
 void draw_windows(const WindowList& list, int32_t first, TileEnd& end, TileSums& sums) {
-  if (list.squares) return blend_windows<Lanes, true>(list, first, end, sums);
-  blend_windows<Lanes, false>(list, first, end, sums);
+  if (list.depths && list.squares) return blend_windows<Lanes, true, true>(list, first, end, sums);
+  if (list.depths) return blend_windows<Lanes, true, false>(list, first, end, sums);
+  if (list.squares) return blend_windows<Lanes, false, true>(list, first, end, sums);
+  blend_windows<Lanes, false, false>(list, first, end, sums);
 }
 
 // What the way back knows about what lies behind the splats not yet visited.

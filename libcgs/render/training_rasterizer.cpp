@@ -209,19 +209,18 @@ void TrainingRasterizer::Tape::bin_into_tiles(int row) {
 void TrainingRasterizer::Tape::resize_outputs() {
   const int width = view.camera.width;
   const int height = view.camera.height;
-  for (Raster<float>* raster : {&out.color[0],
-                                &out.color[1],
-                                &out.color[2],
-                                &out.alpha,
-                                &out.depth_sum,
-                                &out.depth_square_sum}) {
-    if (raster->width != width || raster->height != height) *raster = {width, height, 0};
-  }
-  if (!options.weight_squares) {
-    out.weight_square_sum = {};
-  } else if (out.weight_square_sum.width != width || out.weight_square_sum.height != height) {
-    out.weight_square_sum = {width, height, 0};
-  }
+  const auto match = [&](Raster<float>& raster, bool is_drawn) {
+    if (!is_drawn) {
+      raster = {};
+    } else if (raster.width != width || raster.height != height) {
+      raster = {width, height, 0};
+    }
+  };
+  for (Raster<float>& plane : out.color) match(plane, true);
+  match(out.alpha, true);
+  match(out.depth_sum, options.depth_sums);
+  match(out.depth_square_sum, options.depth_sums);
+  match(out.weight_square_sum, options.weight_squares);
 }
 
 void TrainingRasterizer::Tape::draw(int column, int row) {
@@ -229,6 +228,7 @@ void TrainingRasterizer::Tape::draw(int column, int row) {
   TileEnd& end =
       ends[static_cast<size_t>(row) * static_cast<size_t>(columns) + static_cast<size_t>(column)];
   TileSums sums;
+  sums.has_depths = options.depth_sums;
   sums.has_weight_squares = options.weight_squares;
   draw_tile(tile_splats(column, row), size, end, sums);
   for (int y = 0; y < size[1]; ++y) {
@@ -240,8 +240,10 @@ void TrainingRasterizer::Tape::draw(int column, int row) {
         out.color[c].data[to + x] = sums.color[c][from] + T * options.background[c];
       }
       out.alpha.data[to + x] = 1.0f - T;
-      out.depth_sum.data[to + x] = sums.depth[from];
-      out.depth_square_sum.data[to + x] = sums.depth_square[from];
+      if (options.depth_sums) {
+        out.depth_sum.data[to + x] = sums.depth[from];
+        out.depth_square_sum.data[to + x] = sums.depth_square[from];
+      }
       if (options.weight_squares) out.weight_square_sum.data[to + x] = sums.weight_square[from];
     }
   }

@@ -21,10 +21,11 @@ using ColorPlanes = std::array<Raster<float>, 3>;
 /// loss, each raster holds the derivative with respect to the value of that name, and an empty
 /// raster stands for zeros.
 struct TrainingBuffers {
-  ColorPlanes color;               ///< Sum w_i c_i + (1 - alpha) * background
-  Raster<float> alpha;             ///< Sum w_i
-  Raster<float> depth_sum;         ///< Sum w_i z_i, not divided by alpha.
-  Raster<float> depth_square_sum;  ///< Sum w_i z_i^2
+  ColorPlanes color;    ///< Sum w_i c_i + (1 - alpha) * background
+  Raster<float> alpha;  ///< Sum w_i
+  /// Sum w_i z_i, not divided by alpha; empty unless TrainingRasterizerOptions::depth_sums.
+  Raster<float> depth_sum;
+  Raster<float> depth_square_sum;  ///< Sum w_i z_i^2; empty like depth_sum.
   /// Sum w_i^2; empty unless TrainingRasterizerOptions::weight_squares.
   Raster<float> weight_square_sum;
 };
@@ -42,6 +43,7 @@ struct TrainingRasterizerOptions {
   float near_depth = 1e-3f;         ///< Centres nearer than this are culled [internal units]; > 0.
   GaussianShape shape = GaussianShape::Balls;
   bool sh_gradients = false;           ///< Fill GaussianGradients::sh.
+  bool depth_sums = true;              ///< Draw the depth sums of TrainingBuffers.
   bool weight_squares = false;         ///< Draw TrainingBuffers::weight_square_sum.
   bool image_place_gradients = false;  ///< Fill GaussianGradients::image_place.
 

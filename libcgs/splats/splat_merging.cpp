@@ -303,7 +303,8 @@ WeighedSplats weigh_splats(const Gaussians& gaussians, std::span<const Camera> c
   grey.rotation = gaussians.rotation;
   grey.opacity = gaussians.opacity;
   grey.sh.assign(gaussians.size(), Eigen::Vector3f::Zero());
-  TrainingRasterizer rasterizer({.shape = GaussianShape::Ellipsoids, .sh_gradients = true});
+  TrainingRasterizer rasterizer(
+      {.shape = GaussianShape::Ellipsoids, .sh_gradients = true, .depth_sums = false});
   GaussianGradients sum;
   for (const Camera& camera : cameras) {
     rasterizer.forward(grey, camera);

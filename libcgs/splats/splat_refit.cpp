@@ -52,7 +52,7 @@ Refit::Refit(Gaussians& gaussians, const std::vector<float>& pixel)
     : g_(gaussians),
       pixel_(pixel),
       start_(gaussians.position),
-      rasterizer_({.shape = GaussianShape::Ellipsoids, .sh_gradients = true}) {
+      rasterizer_({.shape = GaussianShape::Ellipsoids, .sh_gradients = true, .depth_sums = false}) {
   const size_t count = g_.size();
   p_.opacity.resize(count);
   for (ParameterBlock* block : {&p_.color, &p_.scale, &p_.position}) block->resize(3 * count);
@@ -133,7 +133,7 @@ void Refit::step(const PictureToMatch& picture, float rate) {
 
 std::vector<PictureToMatch> pictures_to_match(const Gaussians& gaussians,
                                               std::span<const Camera> cameras) {
-  TrainingRasterizer rasterizer({.shape = GaussianShape::Ellipsoids});
+  TrainingRasterizer rasterizer({.shape = GaussianShape::Ellipsoids, .depth_sums = false});
   std::vector<PictureToMatch> out;
   for (const Camera& camera : cameras) {
     const TrainingBuffers& drawn = rasterizer.forward(gaussians, camera);

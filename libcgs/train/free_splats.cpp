@@ -125,6 +125,7 @@ FreeSplats::FreeSplats(const Scene& scene,
     : options_(options),
       rasterizer_({.shape = GaussianShape::Ellipsoids,
                    .sh_gradients = true,
+                   .depth_sums = false,
                    .image_place_gradients = true}) {
   options.validate();
   require(!scene.input.empty(), "FreeSplats: number of input views must be > 0", 0);
@@ -331,6 +332,7 @@ StepReport FreeSplats::step() {
   how.background = random_background(static_cast<uint64_t>(step_), 0);
   how.shape = GaussianShape::Ellipsoids;
   how.sh_gradients = how.image_place_gradients = true;
+  how.depth_sums = false;
   rasterizer_.set_options(how);
   const TrainingBuffers& drawn = rasterizer_.forward(gaussians_, view.camera);
   const MaskMap* use = view.use.empty() ? nullptr : &view.use;

@@ -99,12 +99,12 @@ double total_variation(const TrainingBuffers& rendered,
                        double weight,
                        TrainingBuffers& gradient) {
   const Raster<float>& alpha = rendered.alpha;
+  if (weight == 0) return 0;  // depth need not be drawn then
   require(unit > 0, "total_variation: unit must be > 0", unit);
   require(!alpha.empty() && same_size(alpha, rendered.depth_sum) &&
               (layer == nullptr || same_size(alpha, *layer)),
           "total_variation: alpha, depth and layers must have one size",
           rendered.depth_sum.width);
-  if (weight == 0) return 0;
   const Disparities disparity = disparities(rendered, double(unit), layer);
   const Eigen::Array2d x = total_difference(disparity, 1, 0);
   const Eigen::Array2d y = total_difference(disparity, 0, 1);

@@ -87,6 +87,12 @@ std::vector<TrainingView> training_views(const Scene& scene,
   return out;
 }
 
+// Whether a term has a weight that reads the depth of what is drawn.
+bool reads_depth(const TrainingOptions& options) {
+  return options.tv_weight > 0 || options.masked_tv_weight > 0 || options.spread_weight > 0 ||
+         options.virtual_tv_weight > 0;
+}
+
 CoherentGaussians model_of(const Scene& scene,
                            const std::vector<ViewPriors>& priors,
                            const CoherenceOptions& options,
@@ -152,6 +158,7 @@ const TrainingBuffers& Trainer::draw(const Gaussians& gaussians,
   TrainingRasterizerOptions how;
   how.background = random_background(static_cast<uint64_t>(step_), view);
   how.sh_gradients = options_.color_rate > 0;
+  how.depth_sums = reads_depth(options_);
   how.weight_squares = options_.emptiness_weight > 0;
   how.shape = model_.shapes_are_free() ? GaussianShape::Ellipsoids : GaussianShape::Balls;
   rasterizer_.set_options(how);

@@ -390,6 +390,39 @@ GaussianGradients gradients(const Gaussians& g,
   return out;
 }
 
+// Whoever reads no depth leaves it out: all else keeps its bits, also with memory of before.
+TEST(TrainingRasterizer, LeavesOutDepthAloneWhereNobodyReadsIt) {
+  const Camera camera = oblique_camera();
+  const Gaussians g =
+      random_gaussians(camera, {.count = 300, .sigma_px = 4, .anisotropy = 3, .sh_degree = 1}, 21);
+  const TrainingBuffers loss = random_loss(camera, 0b1001111, 22);
+  for (const bool squares : {false, true}) {
+    TrainingRasterizerOptions options{.background = {0.3f, 0.6f, 0.9f},
+                                      .shape = GaussianShape::Ellipsoids,
+                                      .sh_gradients = true,
+                                      .weight_squares = squares};
+    TrainingRasterizer rasterizer(options);
+    TrainingBuffers with = rasterizer.forward(g, camera);
+    GaussianGradients expected;
+    rasterizer.backward(loss, expected);
+    options.depth_sums = false;
+    rasterizer.set_options(options);
+    TrainingBuffers without = rasterizer.forward(g, camera);
+    GaussianGradients got;
+    rasterizer.backward(loss, got);
+    EXPECT_FALSE(with.depth_sum.empty());
+    EXPECT_TRUE(without.depth_sum.empty() && without.depth_square_sum.empty());
+    with.depth_sum = with.depth_square_sum = {};
+    for (size_t k = 0; k < planes(with).size(); ++k) {
+      EXPECT_EQ(planes(with).at(k)->data, planes(without).at(k)->data) << k;
+    }
+    EXPECT_TRUE(same_bits(got, expected));
+    options.depth_sums = true;
+    rasterizer.set_options(options);
+    EXPECT_FALSE(rasterizer.forward(g, camera).depth_square_sum.empty());
+  }
+}
+
 TEST(TrainingRasterizer, GivesTheSameBitsForAnyNumberOfThreads) {
   const Camera camera = resized(oblique_camera(), 370, 260);
   const Gaussians g = random_gaussians(
