@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 namespace cgs::membrane_test {
 namespace {
@@ -54,6 +55,52 @@ TEST(Membrane, EndsWhereItHasNoPart) {
   relax_membrane(values, pixels, 0, 300);
   for (int x = 0; x < 8; ++x) EXPECT_NEAR(values(x, 0), 2, 1e-4);
   EXPECT_EQ(values(8, 0), -100);
+}
+
+// One sweep over all pixels, those of one colour of a chessboard after those of the other.
+void sweep(Raster<float>& values, const Raster<MembranePixel>& pixels, float pull, float step) {
+  for (int color = 0; color < 2; ++color) {
+    for (int y = 0; y < values.height; ++y) {
+      for (int x = 0; x < values.width; ++x) {
+        if ((x + y) % 2 != color || pixels(x, y) != MembranePixel::Open) continue;
+        float sum = 0;
+        float count = 0;
+        const auto add = [&](int u, int v) {
+          if (!pixels.contains(u, v) || pixels(u, v) == MembranePixel::Outside) return;
+          sum += values(u, v);
+          ++count;
+        };
+        add(x - 1, y);
+        add(x + 1, y);
+        add(x, y - 1);
+        add(x, y + 1);
+        const float rest = count > 0 ? sum / (count + pull) : values(x, y);
+        values(x, y) += step * (rest - values(x, y));
+      }
+    }
+  }
+}
+
+TEST(Membrane, SweepsOverOpenPixelsAsOverAllForAnyNumberOfThreads) {
+  constexpr float kReach = 5;
+  Raster<float> start(37, 29, 0);
+  Raster<MembranePixel> pixels(37, 29, MembranePixel::Fixed);
+  for (size_t i = 0; i < start.data.size(); ++i) {
+    start.data[i] = std::sin(0.7f * static_cast<float>(i));
+    if (i / 37 == 11) continue;  // a row without any
+    if (i % 5 == 0 || i % 7 < 3) pixels.data[i] = MembranePixel::Open;
+    if (i % 11 == 0) pixels.data[i] = MembranePixel::Outside;
+  }
+  Raster<float> expected = start;
+  for (int k = 0; k < 20; ++k) {
+    sweep(expected, pixels, 1 / (kReach * kReach), k + 8 < 20 ? 1.8f : 1.0f);
+  }
+  for (const size_t threads : {size_t{1}, size_t{4}}) {
+    const tbb::global_control some(tbb::global_control::max_allowed_parallelism, threads);
+    Raster<float> values = start;
+    relax_membrane(values, pixels, kReach, 20);
+    EXPECT_EQ(values.data, expected.data) << threads;
+  }
 }
 
 }  // namespace
