@@ -35,7 +35,8 @@ std::vector<SupportView> support_views(const Model& model) {
   for (size_t k = 0; k < model.priors.size(); ++k) {
     const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
     const ViewPriors& priors = model.priors[k];
-    views.push_back({view.camera, priors.depth, priors.sigma, evidence_of(priors)});
+    views.push_back({view.camera, priors.depth, priors.sigma, evidence_of(priors), {}});
+    link_pixels(views.back());
   }
   return views;
 }

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include <tbb/parallel_for.h>
+
 namespace cgs {
 
 namespace {
@@ -18,34 +20,50 @@ struct PixelStep {
   int dx, dy;
 };
 
-// The cells of a view in inverse depth, in which planes are linear over the picture.
+// In inverse depth planes are linear over the picture.
+DepthMap inverse_of(const DepthMap& depth) {
+  DepthMap out(depth.width, depth.height, kNan);
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    if (depth.data[i] > 0) out.data[i] = 1 / depth.data[i];
+  }
+  return out;
+}
+
+float value_at(const DepthMap& map, int x, int y) { return map.contains(x, y) ? map(x, y) : kNan; }
+
+constexpr uint8_t kLinkedRight = 1;
+constexpr uint8_t kLinkedBelow = 2;
+
+// Whether a pixel and the next one lie on one surface; the same from either of the two.
+bool are_linked(const DepthMap& inverse_depth, const DepthMap& gap, int x, int y, PixelStep s) {
+  constexpr float kSteepest = 0.1f;   // step of a slanted surface, part of the inverse depth
+  constexpr float kCurvature = 0.5f;  // change from step to step, part of the step
+  const float here = value_at(inverse_depth, x, y);
+  const float there = value_at(inverse_depth, x + s.dx, y + s.dy);
+  if (std::isnan(here) || std::isnan(there)) return false;
+  const float step = there - here;
+  const float size = std::abs(step) / std::min(here, there);
+  if (size <= std::max(gap(x, y), gap(x + s.dx, y + s.dy))) return true;
+  if (size > kSteepest) return false;
+  const float before = here - value_at(inverse_depth, x - s.dx, y - s.dy);
+  const float after = value_at(inverse_depth, x + 2 * s.dx, y + 2 * s.dy) - there;
+  const float change = std::fmin(std::abs(before - step), std::abs(after - step));
+  return change <= kCurvature * std::abs(step);  // not if unknown
+}
+
+// The cells of a view in inverse depth.
 class Surface {
  public:
   explicit Surface(const DepthCells& cells)
-      : gap_(cells.gap), inverse_depth_(cells.depth.width, cells.depth.height, kNan) {
-    for (size_t i = 0; i < inverse_depth_.data.size(); ++i) {
-      if (cells.depth.data[i] > 0) inverse_depth_.data[i] = 1 / cells.depth.data[i];
-    }
-  }
+      : links_(cells.links), inverse_depth_(inverse_of(cells.depth)) {}
 
-  float at(int x, int y) const {
-    return inverse_depth_.contains(x, y) ? inverse_depth_(x, y) : kNan;
-  }
+  float at(int x, int y) const { return value_at(inverse_depth_, x, y); }
 
   bool continues(int x, int y, PixelStep s) const {
-    constexpr float kSteepest = 0.1f;   // step of a slanted surface, part of the inverse depth
-    constexpr float kCurvature = 0.5f;  // change from step to step, part of the step
-    const float here = at(x, y);
-    const float there = at(x + s.dx, y + s.dy);
-    if (std::isnan(here) || std::isnan(there)) return false;
-    const float step = there - here;
-    const float size = std::abs(step) / std::min(here, there);
-    if (size <= std::max(gap_(x, y), gap_(x + s.dx, y + s.dy))) return true;
-    if (size > kSteepest) return false;
-    const float before = here - at(x - s.dx, y - s.dy);
-    const float after = at(x + 2 * s.dx, y + 2 * s.dy) - there;
-    const float change = std::fmin(std::abs(before - step), std::abs(after - step));
-    return change <= kCurvature * std::abs(step);  // not if unknown
+    const int left = std::min(x, x + s.dx);
+    const int top = std::min(y, y + s.dy);
+    if (!links_.contains(left, top)) return false;
+    return (links_(left, top) & (s.dx != 0 ? kLinkedRight : kLinkedBelow)) != 0;
   }
 
   // Change over one pixel along an axis, of the neighbours on the same surface.
@@ -69,7 +87,7 @@ class Surface {
   }
 
  private:
-  const DepthMap& gap_;
+  const SurfaceLinks& links_;
   DepthMap inverse_depth_;
 };
 
@@ -154,6 +172,19 @@ class Canvas {
 };
 
 }  // namespace
+
+SurfaceLinks surface_links(const DepthMap& depth, const DepthMap& gap) {
+  const DepthMap inverse_depth = inverse_of(depth);
+  SurfaceLinks out(depth.width, depth.height, 0);
+  tbb::parallel_for(0, depth.height, [&](int y) {
+    for (int x = 0; x < depth.width; ++x) {
+      const bool right = are_linked(inverse_depth, gap, x, y, {1, 0});
+      const bool below = are_linked(inverse_depth, gap, x, y, {0, 1});
+      out(x, y) = static_cast<uint8_t>((right ? kLinkedRight : 0) | (below ? kLinkedBelow : 0));
+    }
+  });
+  return out;
+}
 
 SeenSurface seen_surface(const DepthCells& cells, const Camera& camera) {
   constexpr std::array<PixelStep, 4> kCorners = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};

@@ -10,7 +10,6 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "libcgs/render/seen_surface.h"
 
 namespace cgs {
 
@@ -55,7 +54,10 @@ DepthMap gaps(const SupportView& view, const SupportOptions& options) {
 }
 
 Witness make_witness(const SupportView& view, const Camera& camera, const SupportOptions& options) {
-  const SeenSurface surface = seen_surface({view.camera, view.depth, gaps(view, options)}, camera);
+  SurfaceLinks anew;
+  if (view.links.empty()) anew = surface_links(view.depth, gaps(view, options));
+  const SurfaceLinks& links = view.links.empty() ? anew : view.links;
+  const SeenSurface surface = seen_surface({view.camera, view.depth, links}, camera);
   Witness out{surface.depth, surface.depth, {}};
   if (!view.evidence.empty()) {
     out.evidence = EvidenceMap(camera.width, camera.height, DepthEvidence::Measured);
@@ -208,8 +210,9 @@ void check_arguments(const RenderBuffers& buffers,
   for (const SupportView& view : views) {
     require(fits(view.depth, view.camera) &&
                 (view.sigma.empty() || fits(view.sigma, view.camera)) &&
-                (view.evidence.empty() || fits(view.evidence, view.camera)),
-            "annotate_support: depth, sigma and evidence must have the size of their camera",
+                (view.evidence.empty() || fits(view.evidence, view.camera)) &&
+                (view.links.empty() || fits(view.links, view.camera)),
+            "annotate_support: depth, sigma, evidence and links must have the size of their camera",
             view.depth.width);
   }
 }
@@ -224,6 +227,11 @@ void SupportOptions::validate() const {
   require(relative_tolerance > 0 && std::isfinite(relative_tolerance),
           "SupportOptions.relative_tolerance must be > 0",
           relative_tolerance);
+}
+
+void link_pixels(SupportView& view, const SupportOptions& options) {
+  options.validate();
+  view.links = surface_links(view.depth, gaps(view, options));
 }
 
 void annotate_support(RenderBuffers& buffers,

@@ -6,6 +6,7 @@
 #include "libcgs/core/camera.h"
 #include "libcgs/core/depth_evidence.h"
 #include "libcgs/render/render_buffers.h"
+#include "libcgs/render/seen_surface.h"
 
 namespace cgs {
 
@@ -18,6 +19,7 @@ struct SupportView {
   DepthMap depth;  ///< Of the size of the camera [internal units]; NaN = saw nothing here.
   DepthMap sigma;  ///< Standard deviation of depth [internal units]; NaN, or empty, = no statement.
   EvidenceMap evidence;  ///< What vouches for the depth.
+  SurfaceLinks links;    ///< As link_pixels() fills it; empty = found anew for each rendered view.
 };
 
 /// When an input view counts as having seen a rendered pixel.
@@ -30,14 +32,18 @@ struct SupportOptions {
   void validate() const;
 };
 
+/// Finds out which pixels of a view lie on one surface, once for all rendered views. Depth that is
+/// uncertain by more than relative_tolerance is not taken to be torn by its own noise.
+/// \param options  those that annotate_support() will get
+void link_pixels(SupportView& view, const SupportOptions& options = {});
+
 /// Fills support and hole of a rendered view.
 ///
 /// The surface of a pixel is its median depth (its mean depth where that is unknown). An input view
 /// supports the pixel if the surface that the view saw (seen_surface()) lands on the centre of that
 /// very pixel, nearest first, at the same depth: within max(relative_tolerance * depth,
 /// sigma_factor * sigma), plus what a slanted surface changes over 1.5 pixels. What the view hides
-/// or never had in its picture lands nowhere. Depth that is uncertain by more than
-/// relative_tolerance is not taken to be torn by its own noise.
+/// or never had in its picture lands nowhere.
 ///
 /// Blended Gaussians have soft rims, so that a pixel beside a silhouette may show what is not quite
 /// there. Where no view agrees at the very pixel but one does within three pixels, the pixel is

@@ -45,7 +45,28 @@ DepthMap step_depth(const Camera& camera, float near, float far) {
 
 SeenSurface seen(const Camera& from, const DepthMap& depth, const Camera& to, float gap = kGap) {
   const DepthMap gaps(depth.width, depth.height, gap);
-  return seen_surface({from, depth, gaps}, to);
+  return seen_surface({from, depth, surface_links(depth, gaps)}, to);
+}
+
+constexpr int kRight = 1;
+constexpr int kBelow = 2;
+
+TEST(SurfaceLinks, JoinNeighboursWithoutAGapOrOnASlope) {
+  const Camera camera = camera_at({0, 0, 0});
+  DepthMap depth = step_depth(camera, 1, 2);
+  depth(60, 30) = kNan;
+  const SurfaceLinks links = surface_links(depth, DepthMap(80, 60, kGap));
+  EXPECT_EQ(links(10, 10), kRight + kBelow);
+  EXPECT_EQ(links(39, 10), kBelow) << "the step";
+  EXPECT_EQ(links(60, 30), 0) << "unknown";
+  EXPECT_EQ(links(59, 30), kBelow);
+  EXPECT_EQ(links(60, 29), kRight);
+  EXPECT_EQ(links(79, 10), kBelow) << "the right edge";
+  EXPECT_EQ(links(10, 59), kRight) << "the lower edge";
+  // On the left, steps are twice the gap, and go on evenly.
+  const DepthMap slope = plane_depth({1.2, 0, 1}, camera);
+  const SurfaceLinks on_slope = surface_links(slope, DepthMap(80, 60, kGap));
+  for (int x = 0; x < 79; ++x) EXPECT_EQ(on_slope(x, 30), kRight + kBelow) << x;
 }
 
 TEST(SeenSurface, IsTheDepthItselfFromTheSamePlace) {

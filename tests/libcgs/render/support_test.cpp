@@ -307,6 +307,28 @@ TEST(AnnotateSupport, FindsNoWitnessBehindOrBesideItsImage) {
   EXPECT_EQ(facing.judged(), Hole::Outside);
 }
 
+TEST(AnnotateSupport, IsTheSameOfViewsThatAreLinkedOnceForAll) {
+  const WallAndBox scene;
+  std::vector<SupportView> views;
+  Gaussians g;
+  for (const Camera& camera : three_in_a_row()) {
+    views.push_back(view_of(scene, camera));
+    add_pixels(views.back(), g);
+    views.back().sigma = DepthMap(camera.width, camera.height, 0.01f);  // widens gaps
+    views.back().depth(50, 60) = kNan;
+  }
+  const Camera novel = camera_at({0.12, 0.05, 0.1});
+  RenderBuffers expected = rasterize(g, novel);
+  RenderBuffers buffers = expected;
+  annotate_support(expected, novel, views);
+  for (SupportView& view : views) link_pixels(view);
+  annotate_support(buffers, novel, views);
+  EXPECT_EQ(buffers.support.data, expected.support.data);
+  EXPECT_EQ(buffers.hole.data, expected.hole.data);
+  views[0].links = SurfaceLinks(3, 3, 0);
+  EXPECT_THROW(annotate_support(buffers, novel, views), InvalidInput);
+}
+
 TEST(AnnotateSupport, RefusesSizesThatDisagreeAndOptionsOutOfRange) {
   Facing facing(1, 1);
   EXPECT_NO_THROW(SupportOptions{}.validate());
