@@ -96,9 +96,9 @@ std::vector<Eigen::Vector3d> points_of(const std::vector<SeenHoles>& candidates)
   return out;
 }
 
-bool sees_hole(const SeenHoles& holes, const Eigen::Vector3d& point) {
+bool sees_hole(const SeenHoles& holes, const Eigen::Vector3d& point_in_cam) {
   constexpr double kAgrees = 0.1;
-  const Eigen::Vector3d uvz = holes.camera.project(point);
+  const Eigen::Vector3d uvz = holes.camera.project_in_cam(point_in_cam);
   if (!holes.camera.sees(uvz)) return false;
   const double z = holes.depth(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
   return std::abs(uvz.z() - z) <= kAgrees * z;  // not if unknown
@@ -112,8 +112,9 @@ std::vector<Sight> sights_of(const std::vector<SeenHoles>& candidates,
   std::vector<Sight> out(candidates.size());
   tbb::parallel_for(size_t{0}, candidates.size(), [&](size_t k) {
     out[k].resize(points.size());
+    const Eigen::Isometry3d cam_from_world = candidates[k].camera.cam_from_world();
     for (size_t i = 0; i < points.size(); ++i) {
-      out[k][i] = sees_hole(candidates[k], points[i]) ? 1 : 0;
+      out[k][i] = sees_hole(candidates[k], cam_from_world * points[i]) ? 1 : 0;
     }
   });
   return out;

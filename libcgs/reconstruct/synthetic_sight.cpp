@@ -17,9 +17,9 @@ namespace {
 
 constexpr double kBehind = 1.01;  // of the depth that an input view saw
 
-// Whether a point stands before what an input view saw.
-bool stands_before(const SupportView& input, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d uvz = input.camera.project(point);
+// Whether a point, in camera axes, stands before what an input view saw.
+bool stands_before(const SupportView& input, const Eigen::Vector3d& point_in_cam) {
+  const Eigen::Vector3d uvz = input.camera.project_in_cam(point_in_cam);
   if (!input.camera.sees(uvz)) return false;
   const float seen = input.depth(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
   return uvz.z() < kBehind * double{seen};  // not if unknown
@@ -51,13 +51,13 @@ bool has_any_set(const MaskMap& mask) {
   return std::find(mask.data.begin(), mask.data.end(), 1) != mask.data.end();
 }
 
-// Whether a Gaussian is drawn in a pixel that is set, within so many standard deviations.
+// Whether a Gaussian with its centre at `uvz` is drawn in a pixel that is set, within so many
+// standard deviations.
 bool touches(const MaskMap& mask,
              const Camera& camera,
-             const Eigen::Vector3f& at,
+             const Eigen::Vector3d& uvz,
              float scale,
              double reach) {
-  const Eigen::Vector3d uvz = camera.project(at.cast<double>());
   if (!(uvz.z() > 0)) return false;
   const double sigma = double{scale} * std::max(camera.fx, camera.fy) / uvz.z();
   const double radius = reach * std::sqrt(sigma * sigma + double{kSplatDilation}) + 0.5;
@@ -80,13 +80,16 @@ float hidden_from_all(
     const std::vector<SupportView>& inputs, const Camera& camera, int x, int y, float depth) {
   constexpr double kStep = 1.01;
   constexpr int kSteps = 700;  // to a thousand times the depth
+  std::vector<Eigen::Isometry3d> cam_from_world;
+  cam_from_world.reserve(inputs.size());
+  for (const SupportView& input : inputs) cam_from_world.push_back(input.camera.cam_from_world());
   double z = depth;
   for (int step = 0; step < kSteps; ++step, z *= kStep) {
     const Eigen::Vector3d point = camera.unproject(x + 0.5, y + 0.5, z);
-    const bool is_hidden =
-        std::none_of(inputs.begin(), inputs.end(), [&](const SupportView& input) {
-          return stands_before(input, point);
-        });
+    bool is_hidden = true;
+    for (size_t k = 0; k < inputs.size() && is_hidden; ++k) {
+      is_hidden = !stands_before(inputs[k], cam_from_world[k] * point);
+    }
     if (is_hidden) return static_cast<float>(z);
   }
   return std::numeric_limits<float>::quiet_NaN();
@@ -108,9 +111,12 @@ std::vector<uint8_t> SyntheticSight::hidden_ones(const Gaussians& fill, double r
     const Camera& camera = input_camera(model_, k);
     const MaskMap showing = showing_pixels(rasterize(together, camera), holes_[k]);
     if (!has_any_set(showing)) continue;
+    const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
     tbb::parallel_for(size_t{0}, fill.size(), [&](size_t i) {
       const float scale = fill.scale[i].maxCoeff();
-      if (touches(showing, camera, fill.position[i], scale, reach)) keep[i] = 0;
+      const Eigen::Vector3d in_cam = cam_from_world * fill.position[i].cast<double>();
+      const Eigen::Vector3d uvz = camera.project_in_cam(in_cam);
+      if (touches(showing, camera, uvz, scale, reach)) keep[i] = 0;
     });
   }
   return keep;

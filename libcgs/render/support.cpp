@@ -146,23 +146,38 @@ struct Judge {
   static constexpr int kRim = 3;  // [pixels]
 };
 
-bool is_in_a_picture(const Eigen::Vector3d& point, std::span<const SupportView> views) {
-  return std::any_of(views.begin(), views.end(), [&](const SupportView& view) {
-    return view.camera.sees(view.camera.project(point));
+// The picture of an input view; its pose is inverted once, not at each pixel.
+struct InputPicture {
+  const Camera& camera;
+  Eigen::Isometry3d cam_from_world;
+};
+
+std::vector<InputPicture> pictures_of(std::span<const SupportView> views) {
+  std::vector<InputPicture> out;
+  for (const SupportView& view : views) out.push_back({view.camera, view.camera.cam_from_world()});
+  return out;
+}
+
+bool is_in_a_picture(const Eigen::Vector3d& point, const std::vector<InputPicture>& pictures) {
+  return std::any_of(pictures.begin(), pictures.end(), [&](const InputPicture& picture) {
+    const Eigen::Vector3d in_cam = picture.cam_from_world * point;
+    return picture.camera.sees(picture.camera.project_in_cam(in_cam));
   });
 }
 
 // Whether the part of a ray before its camera passes through what a picture shows: the four sides
 // of its pyramid and the plane of its camera leave something of the ray.
-bool crosses(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, const Camera& picture) {
-  const Eigen::Isometry3d to_picture = picture.cam_from_world();
-  const Eigen::Vector3d a = to_picture * from;
-  const Eigen::Vector3d b = to_picture.linear() * direction;
+bool crosses(const Eigen::Vector3d& from,
+             const Eigen::Vector3d& direction,
+             const InputPicture& picture) {
+  const Camera& camera = picture.camera;
+  const Eigen::Vector3d a = picture.cam_from_world * from;
+  const Eigen::Vector3d b = picture.cam_from_world.linear() * direction;
   const std::array<Eigen::Vector3d, 5> inward = {
-      Eigen::Vector3d(picture.fx, 0, picture.cx),
-      Eigen::Vector3d(-picture.fx, 0, picture.width - picture.cx),
-      Eigen::Vector3d(0, picture.fy, picture.cy),
-      Eigen::Vector3d(0, -picture.fy, picture.height - picture.cy),
+      Eigen::Vector3d(camera.fx, 0, camera.cx),
+      Eigen::Vector3d(-camera.fx, 0, camera.width - camera.cx),
+      Eigen::Vector3d(0, camera.fy, camera.cy),
+      Eigen::Vector3d(0, -camera.fy, camera.height - camera.cy),
       Eigen::Vector3d::UnitZ()};
   double first = 0;
   double last = std::numeric_limits<double>::infinity();
@@ -181,16 +196,18 @@ bool crosses(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, cons
 }
 
 // Why pixel (x, y) with a surface of depth z (NaN = none) is a hole.
-Hole kind_of_hole(const Camera& camera, int x, int y, float z, std::span<const SupportView> views) {
+Hole kind_of_hole(
+    const Camera& camera, int x, int y, float z, const std::vector<InputPicture>& pictures) {
   const double u = x + 0.5;
   const double v = y + 0.5;
   if (!std::isnan(z)) {
-    return is_in_a_picture(camera.unproject(u, v, z), views) ? Hole::Occluded : Hole::Outside;
+    return is_in_a_picture(camera.unproject(u, v, z), pictures) ? Hole::Occluded : Hole::Outside;
   }
   const Eigen::Vector3d direction = camera.world_from_cam.linear() * camera.ray_in_cam(u, v);
-  const bool was_looked_at = std::any_of(views.begin(), views.end(), [&](const SupportView& view) {
-    return crosses(camera.center(), direction, view.camera);
-  });
+  const bool was_looked_at =
+      std::any_of(pictures.begin(), pictures.end(), [&](const InputPicture& picture) {
+        return crosses(camera.center(), direction, picture);
+      });
   return was_looked_at ? Hole::Transparent : Hole::Outside;
 }
 
@@ -247,12 +264,14 @@ void annotate_support(RenderBuffers& buffers,
   buffers.support = Raster<uint8_t>(camera.width, camera.height, 0);
   buffers.hole = Raster<Hole>(camera.width, camera.height, Hole::None);
   const Judge judge{buffers, witnesses, options};
+  const std::vector<InputPicture> pictures = pictures_of(views);
   tbb::parallel_for(0, camera.height, [&](int y) {
     for (int x = 0; x < camera.width; ++x) {
       const float z = judge.surface(x, y);
       const Verdict verdict = std::isnan(z) ? Verdict() : judge.of(x, y);
       buffers.support(x, y) = static_cast<uint8_t>(verdict.support);
-      buffers.hole(x, y) = verdict.is_shown() ? verdict.kind : kind_of_hole(camera, x, y, z, views);
+      buffers.hole(x, y) =
+          verdict.is_shown() ? verdict.kind : kind_of_hole(camera, x, y, z, pictures);
     }
   });
 }

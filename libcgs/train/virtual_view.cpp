@@ -17,11 +17,13 @@ DepthMap nearest_points(const TrainingView& view,
                         std::span<const PixelMatch> matches,
                         const Camera& camera) {
   DepthMap out(camera.width, camera.height, 0);
+  const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
   for (const PixelMatch& match : matches) {
     const int x = match.pixel % view.measured.width;
     const int y = match.pixel / view.measured.width;
-    const Eigen::Vector3d uvz =
-        camera.project(view.camera.unproject(x + 0.5, y + 0.5, double(view.measured(x, y))));
+    const Eigen::Vector3d point =
+        view.camera.unproject(x + 0.5, y + 0.5, double(view.measured(x, y)));
+    const Eigen::Vector3d uvz = camera.project_in_cam(cam_from_world * point);
     if (!camera.sees(uvz)) continue;
     float& nearest = out(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
     const auto z = static_cast<float>(uvz.z());
@@ -30,9 +32,11 @@ DepthMap nearest_points(const TrainingView& view,
   return out;
 }
 
-// Colour of a photograph where it shows a point, bilinear; nothing outside of it or in its mask.
-std::optional<Eigen::Vector3f> color_of(const TrainingView& view, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d uvz = view.camera.project(point);
+// Colour of a photograph where it shows a point, in camera axes, bilinear; nothing outside of it or
+// in its mask.
+std::optional<Eigen::Vector3f> color_of(const TrainingView& view,
+                                        const Eigen::Vector3d& point_in_cam) {
+  const Eigen::Vector3d uvz = view.camera.project_in_cam(point_in_cam);
   const double u = uvz.x() - 0.5;
   const double v = uvz.y() - 0.5;
   const bool is_inside =
@@ -66,13 +70,15 @@ VirtualView virtual_view(const TrainingView& first,
   for (Raster<float>& plane : out.photograph) plane = Raster<float>(width, height, 0);
   out.use = MaskMap(width, height, 0);
   const DepthMap depth = nearest_points(first, matches, out.camera);
+  const Eigen::Isometry3d first_from_world = first.camera.cam_from_world();
+  const Eigen::Isometry3d second_from_world = second.camera.cam_from_world();
   const auto part = static_cast<float>(share);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       if (depth(x, y) == 0) continue;
       const Eigen::Vector3d point = out.camera.unproject(x + 0.5, y + 0.5, double(depth(x, y)));
-      const auto a = color_of(first, point);
-      const auto b = color_of(second, point);
+      const auto a = color_of(first, first_from_world * point);
+      const auto b = color_of(second, second_from_world * point);
       if (!a || !b || (*a - *b).cwiseAbs().mean() > kMostDifference) continue;
       out.use(x, y) = 1;
       for (int c = 0; c < 3; ++c) out.photograph[c](x, y) = (1 - part) * (*a)[c] + part * (*b)[c];
