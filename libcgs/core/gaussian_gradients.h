@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include <Eigen/Core>
@@ -30,5 +31,17 @@ struct GaussianGradients {
   std::vector<Eigen::Vector2f> image_place;    ///< Place of the centre in the image, if asked for
                                                ///< [1 / pixels].
 };
+
+/// Sets all derivatives to zero and keeps their memory, for the next sum over the same Gaussians.
+inline void set_zero(GaussianGradients& g) {
+  const Eigen::Vector3f none = Eigen::Vector3f::Zero();
+  std::fill(g.position.begin(), g.position.end(), none);
+  std::fill(g.opacity.begin(), g.opacity.end(), 0.0f);
+  std::fill(g.radius.begin(), g.radius.end(), 0.0f);
+  std::fill(
+      g.covariance.begin(), g.covariance.end(), CovarianceGradient(CovarianceGradient::Zero()));
+  std::fill(g.sh.begin(), g.sh.end(), none);
+  std::fill(g.image_place.begin(), g.image_place.end(), Eigen::Vector2f(0, 0));
+}
 
 }  // namespace cgs

@@ -311,7 +311,7 @@ WeighedSplats weigh_splats(const Gaussians& gaussians, std::span<const Camera> c
     TrainingBuffers loss;
     loss.color[0] = Raster<float>(camera.width, camera.height, 1 / kShC0);
     for (const int c : {1, 2}) loss.color[c] = Raster<float>(camera.width, camera.height, 0);
-    sum = {};
+    set_zero(sum);
     rasterizer.backward(loss, sum);
     const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
     for_each_splat(grey.size(), [&](size_t i) {

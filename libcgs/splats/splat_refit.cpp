@@ -45,6 +45,7 @@ class Refit {
   const std::vector<float>& pixel_;
   const std::vector<Eigen::Vector3f> start_;  // centres
   TrainingRasterizer rasterizer_;
+  GaussianGradients gradients_;  // of one step; kept for its memory
   Parameters p_;
 };
 
@@ -75,7 +76,7 @@ TrainingBuffers Refit::differences(const PictureToMatch& picture) {
   TrainingBuffers out;
   out.color = drawn.color;
   out.alpha = drawn.alpha;
-  for (size_t i = 0; i < out.alpha.data.size(); ++i) {
+  tbb::parallel_for(size_t{0}, out.alpha.data.size(), [&](size_t i) {
     const float off_alpha = drawn.alpha.data[i] - picture.alpha.data[i];
     float of_alpha = 0;
     for (size_t c = 0; c < 3; ++c) {
@@ -85,7 +86,7 @@ TrainingBuffers Refit::differences(const PictureToMatch& picture) {
       of_alpha -= share * on_white;
     }
     out.alpha.data[i] = of_alpha;
-  }
+  });
   return out;
 }
 
@@ -119,9 +120,9 @@ void Refit::decode() {
 }
 
 void Refit::step(const PictureToMatch& picture, float rate) {
-  GaussianGradients sum;
-  rasterizer_.backward(differences(picture), sum);
-  take_gradients(sum);
+  set_zero(gradients_);
+  rasterizer_.backward(differences(picture), gradients_);
+  take_gradients(gradients_);
   adam_step(p_.opacity, p_.opacity_state, rate * kOpacityRate);
   adam_step(p_.color, p_.color_state, rate * kColorRate);
   adam_step(p_.scale, p_.scale_state, rate * kScaleRate);

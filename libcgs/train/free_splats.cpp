@@ -254,11 +254,11 @@ void FreeSplats::take_gradients(const GaussianGradients& sum) {
 void FreeSplats::add_image_gradients(const GaussianGradients& sum, const Camera& camera) {
   const Eigen::Array2f half(0.5f * float(camera.width), 0.5f * float(camera.height));
   const std::vector<SplatFate>& fate = rasterizer_.projected().fate;
-  for (size_t i = 0; i < fate.size(); ++i) {
-    if (fate[i] != SplatFate::Drawn) continue;
+  tbb::parallel_for(size_t{0}, fate.size(), [&](size_t i) {
+    if (fate[i] != SplatFate::Drawn) return;
     image_gradient_[i] += (sum.image_place[i].array() * half).matrix().norm();
     ++drawn_[i];
-  }
+  });
 }
 
 std::array<float, FreeSplats::kParts> FreeSplats::rates() const {
@@ -314,6 +314,7 @@ void FreeSplats::control_density() {
                          " of the training");
   }
   gaussians_ = std::move(changed.gaussians);
+  gradients_ = {};
   encode();
   keep_states(changed.came_from);
   decode();
@@ -346,10 +347,10 @@ StepReport FreeSplats::step() {
     throw NumericalError("the loss is not finite in step " + std::to_string(step_ + 1) +
                          " of the training");
   }
-  GaussianGradients sum;
-  rasterizer_.backward(loss, sum);
-  take_gradients(sum);
-  add_image_gradients(sum, view.camera);
+  set_zero(gradients_);
+  rasterizer_.backward(loss, gradients_);
+  take_gradients(gradients_);
+  add_image_gradients(gradients_, view.camera);
   const std::array<float, kParts> rate = rates();
   for (size_t part = 0; part < kParts; ++part) {
     report.skipped += adam_step(parameters_[part], states_[part], rate[part]);

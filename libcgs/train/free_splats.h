@@ -101,6 +101,7 @@ class FreeSplats {
   std::array<ParameterBlock, kParts> parameters_;
   std::array<AdamState, kParts> states_;
   TrainingRasterizer rasterizer_;
+  GaussianGradients gradients_;        // of one step; kept for its memory
   std::vector<float> image_gradient_;  // sum since the last round of density control
   std::vector<uint32_t> drawn_;        // steps since then that drew it
   DensityReport density_;

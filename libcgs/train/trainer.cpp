@@ -234,18 +234,19 @@ StepReport Trainer::step() {
   if (!model_.shapes_are_free() && time() >= options_.free_from) {
     model_.free_shapes();
     model_.decode();  // gradients of shapes are those of the ellipses that they now are
+    gradients_ = {};
   }
   StepReport report;
-  GaussianGradients gaussians;
+  set_zero(gradients_);
   const size_t drawn = drawn_at_once(full_.size());
   for (size_t k = 0; k < drawn; ++k) {
-    add_view((static_cast<size_t>(step_) * drawn + k) % full_.size(), gaussians, report);
+    add_view((static_cast<size_t>(step_) * drawn + k) % full_.size(), gradients_, report);
   }
-  add_virtual_view(gaussians, report);
+  add_virtual_view(gradients_, report);
   std::vector<Raster<float>> depth(full_.size());
   depth_terms_.add(model_, priors_, full_, depth, report);
-  opacity_terms_.add(model_, full_, gaussians, report);
-  model_.add_gradients(gaussians, depth);
+  opacity_terms_.add(model_, full_, gradients_, report);
+  model_.add_gradients(gradients_, depth);
   report.bending = model_.add_bending(options_.depth_bending, options_.opacity_bending) +
                    model_.add_opacity_prior(options_.opacity_prior) +
                    model_.add_color_prior(options_.color_prior);

@@ -71,6 +71,7 @@ class Trainer {
   OpacityTerms opacity_terms_;
   TrainingRasterizer rasterizer_;
   Gaussians with_gaps_;            // what dropout leaves for one view; unused without it
+  GaussianGradients gradients_;    // of one step; kept for its memory
   std::vector<AdamState> states_;  // of the blocks of the model
   ParameterAverage average_;       // empty unless the model is to be the mean
   float disparity_unit_ = 1;

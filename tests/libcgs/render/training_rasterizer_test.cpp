@@ -472,6 +472,22 @@ TEST(TrainingRasterizer, AddsToTheDerivativesItIsGiven) {
   EXPECT_TRUE(sum.covariance.empty() && sum.sh.empty());
 }
 
+TEST(TrainingRasterizer, GivesTheSameInMemoryThatWasSetToZero) {
+  const Camera camera = oblique_camera();
+  const Gaussians g = random_gaussians(camera, {.anisotropy = 2, .sh_degree = 1}, 23);
+  const TrainingRasterizerOptions options{
+      .shape = GaussianShape::Ellipsoids, .sh_gradients = true, .image_place_gradients = true};
+  TrainingRasterizer rasterizer(options);
+  GaussianGradients sum;
+  rasterizer.forward(g, camera);
+  rasterizer.backward(random_loss(camera, kEveryChannel, 24), sum);
+  set_zero(sum);
+  rasterizer.backward(random_loss(camera, kEveryChannel, 11), sum);
+  const GaussianGradients fresh = gradients(g, camera, options);
+  EXPECT_TRUE(same_bits(sum, fresh));
+  EXPECT_TRUE(same_bits(sum.image_place, fresh.image_place));
+}
+
 TEST(TrainingRasterizer, GivesNothingForNothing) {
   Camera camera = oblique_camera();
   const Gaussians g = random_gaussians(camera, {.count = 20}, 17);
