@@ -31,18 +31,18 @@ LuminancePlanes luminance_planes(const ColorPlanes& color) {
 // From derivatives with respect to the three copies of the luminance to those by colours.
 void chain(const LuminancePlanes& luminance, ColorPlanes& gradient) {
   if (gradient[0].empty()) return;  // no loss has a weight
-  for (size_t i = 0; i < luminance.derivative.data.size(); ++i) {
+  tbb::parallel_for(size_t(0), luminance.derivative.data.size(), [&](size_t i) {
     const float sum = gradient[0].data[i] + gradient[1].data[i] + gradient[2].data[i];
     for (int c = 0; c < 3; ++c) gradient[c].data[i] = sum * luminance.derivative.data[i][c];
-  }
+  });
 }
 
 // Where the other views do not reach, a dropped block shows nothing and teaches nothing.
-MaskMap pixels_that_teach(const TrainingBuffers& rendered, const TrainingView& view, bool dropped) {
+MaskMap pixels_that_teach(const TrainingBuffers& rendered, const TrainingView& view) {
   MaskMap use(view.camera.width, view.camera.height, 1);
   for (size_t i = 0; i < use.data.size(); ++i) {
     const bool valid = view.use.empty() || view.use.data[i] != 0;
-    use.data[i] = valid && (!dropped || rendered.alpha.data[i] > 0.3f);
+    use.data[i] = valid && rendered.alpha.data[i] > 0.3f;
   }
   return use;
 }
@@ -55,14 +55,17 @@ void add_picture_terms(const TrainingBuffers& rendered,
                        TrainingBuffers& loss,
                        StepReport& report) {
   const auto& [options, share, time, unit] = terms;
-  const MaskMap use = pixels_that_teach(rendered, view, options.dropout > 0);
+  MaskMap teaching;
+  if (options.dropout > 0) teaching = pixels_that_teach(rendered, view);
+  const MaskMap& valid = options.dropout > 0 ? teaching : view.use;
+  const MaskMap* use = valid.empty() ? nullptr : &valid;
   LuminancePlanes luminance;
   if (view.is_grey) luminance = luminance_planes(rendered.color);
   const ColorPlanes& shown = view.is_grey ? luminance.planes : rendered.color;
   report.l1 += multi_scale_l1(
-      shown, view.photograph, &use, options.l1_levels, share * options.l1_weight, loss.color);
+      shown, view.photograph, use, options.l1_levels, share * options.l1_weight, loss.color);
   report.ssim += structural_dissimilarity(
-      shown, view.photograph, &use, share * options.ssim_weight, loss.color);
+      shown, view.photograph, use, share * options.ssim_weight, loss.color);
   if (view.is_grey) chain(luminance, loss.color);
   const double gone_over = options.tv_to_layers * time * options.tv_weight;
   report.tv +=
