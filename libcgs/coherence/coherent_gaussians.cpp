@@ -75,13 +75,16 @@ Eigen::Matrix2d triangle(const float* shape) {
   return out;
 }
 
+struct ShapeBounds {
+  float least, most;  // of the log of the diagonal
+  float corner;       // at most, on either side of 0
+};
+
 // Keeps a shape within bounds, so that no optimiser piles up steps beyond them.
-void bound_shape(float* shape, const CoherenceOptions& options) {
-  const float least = std::log(options.min_radius);
-  const float most = std::log(options.max_radius);
-  shape[0] = std::clamp(shape[0], least, most);
-  shape[1] = std::clamp(shape[1], least, most);
-  shape[2] = std::clamp(shape[2], -options.max_radius, options.max_radius);
+void bound_shape(float* shape, const ShapeBounds& bounds) {
+  shape[0] = std::clamp(shape[0], bounds.least, bounds.most);
+  shape[1] = std::clamp(shape[1], bounds.least, bounds.most);
+  shape[2] = std::clamp(shape[2], -bounds.corner, bounds.corner);
 }
 
 // Scale and rotation of the covariance B B^T + thickness^2 n n^T, with n across the columns of B.
@@ -338,6 +341,8 @@ void CoherentGaussians::decode_view(size_t n) {
   const auto unit = static_cast<float>(view.camera.pixel_size(1));
   const float max_depth = options_.max_depth_change;
   const float max_logit = options_.max_logit_change;
+  const ShapeBounds bounds{
+      std::log(options_.min_radius), std::log(options_.max_radius), options_.max_radius};
   for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
     const size_t g = view.range.first + k;
     float& f = depth_change_[n].data[pixel];
@@ -359,7 +364,7 @@ void CoherentGaussians::decode_view(size_t n) {
       return;
     }
     float* own = &shapes[k * kShapeSize];
-    bound_shape(own, options_);
+    bound_shape(own, bounds);
     const Eigen::Matrix<double, 3, 2> B = double(z) * view.steps[k].cast<double>() * triangle(own);
     const double thickness = double(options_.min_radius * z * unit);
     set_shape(B, thickness, gaussians_.scale[g], gaussians_.rotation[g]);
