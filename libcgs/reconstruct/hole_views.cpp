@@ -39,7 +39,7 @@ void add_cameras_beside(const Model& model, std::vector<Camera>& out) {
   constexpr double kBeside = 20.5 * std::numbers::pi / 180;
   std::vector<std::optional<Eigen::Vector3d>> subjects;
   for (size_t k = 0; k < model.priors.size(); ++k) subjects.push_back(looked_at(model, k));
-  for (const NextView& place : places_around(model)) {
+  for (const NextView& place : places_around(model, model.priors.size())) {
     double least = std::numeric_limits<double>::infinity();
     for (size_t k = 0; k < subjects.size(); ++k) {
       if (!subjects[k]) continue;

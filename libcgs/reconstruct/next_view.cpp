@@ -9,6 +9,7 @@
 
 #include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/thinned.h"
 
 namespace cgs {
 
@@ -110,11 +111,14 @@ std::vector<NextView> rank_next_views(const Model& model,
   return candidates;
 }
 
-std::vector<NextView> places_around(const Model& model) {
+std::vector<NextView> places_around(const Model& model, size_t most_views) {
   const auto seen = subjects(model);
-  std::vector<NextView> out;
+  std::vector<size_t> looking;
   for (size_t k = 0; k < seen.size(); ++k) {
-    if (!seen[k]) continue;
+    if (seen[k]) looking.push_back(k);
+  }
+  std::vector<NextView> out;
+  for (const size_t k : thinned(looking, most_views)) {
     const auto add = [&](double right, double higher) {
       NextView& view = out.emplace_back();
       view.camera = turned(input_camera(model, k), *seen[k], right * kDegree, higher * kDegree);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -38,10 +39,15 @@ std::vector<NextView> rank_next_views(const Model& model,
                                       std::vector<NextView> candidates,
                                       const Progress& progress = {});
 
+/// Input views that places_around() goes around, unless it is told otherwise: what is drawn from
+/// there takes time.
+inline constexpr size_t kMostGoneAround = 16;
+
 /// Places around the input views, as far from what these look at: up to 45 degrees aside, and 20
-/// higher or lower.
+/// higher or lower; twelve of each view.
+/// \param most_views  of more, some are left out evenly
 /// \throws NumericalError if no depth is known
-std::vector<NextView> places_around(const Model& model);
+std::vector<NextView> places_around(const Model& model, size_t most_views = kMostGoneAround);
 
 /// The first of the ranked ones and those after it that stand at least 15 degrees from each one
 /// before, `count` at most.

@@ -97,6 +97,20 @@ TEST(NextView, PlacesAroundLookAtTheSameFromAside) {
   EXPECT_EQ(around, static_cast<int>(places.size()) / 3);
 }
 
+TEST(NextView, PlacesAroundManyViewsAreNoMoreThanAroundSome) {
+  Model model = test::row_of_cameras();
+  const std::vector<NextView> few = places_around(model);
+  EXPECT_EQ(few.size(), 3 * 12u);
+  while (model.priors.size() < 40) {
+    model.scene.input.push_back(static_cast<int>(model.priors.size() % 3));
+    model.priors.push_back(model.priors.front());
+  }
+  EXPECT_EQ(places_around(model, 40).size(), 40 * 12u);
+  const std::vector<NextView> many = places_around(model);
+  EXPECT_LE(many.size(), kMostGoneAround * 12);
+  EXPECT_GT(many.size(), kMostGoneAround * 12 / 2);
+}
+
 TEST(NextView, SayWhichWayTheyStand) {
   const Model model = wall();
   for (const NextView& place : rank_next_views(model, places_around(model))) {
