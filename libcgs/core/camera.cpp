@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/core/camera.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <vector>
 
 #include <tbb/parallel_for.h>
@@ -34,6 +36,15 @@ Camera resized(const Camera& camera, int width, int height) {
   out.fy *= sy;
   out.cy *= sy;
   return out;
+}
+
+Camera resized_to_fit(const Camera& camera, int side) {
+  const double factor = double(std::max(camera.width, camera.height)) / side;
+  if (factor <= 1) return camera;
+  const auto fitting = [&](int pixels) {
+    return std::max(1, static_cast<int>(std::lround(pixels / factor)));
+  };
+  return resized(camera, fitting(camera.width), fitting(camera.height));
 }
 
 namespace {

@@ -54,6 +54,9 @@ struct Camera {
 /// picture (pixel centres at +0.5, so this is a plain scaling).
 Camera resized(const Camera& camera, int width, int height);
 
+/// The same at a size whose longer side is `side` pixels; one that is no larger stays as it is.
+Camera resized_to_fit(const Camera& camera, int side);
+
 /// Normals of a depth map by central differences of its unprojected points, one-sided at unknown
 /// neighbours.
 ///

@@ -3,13 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
-#include <optional>
 
 #include <tbb/parallel_for.h>
 
-#include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/thinned.h"
 #include "libcgs/reconstruct/camera_path.h"
@@ -23,30 +20,13 @@ namespace {
 constexpr size_t kMostCameras = 6;
 constexpr double kEnoughSeen = 0.95;
 
-// Coarse: which holes a camera sees needs no detail.
-Camera coarse(const Camera& camera) {
-  constexpr int kSide = 120;  // [pixels]
-  const double factor = double(std::max(camera.width, camera.height)) / kSide;
-  if (factor <= 1) return camera;
-  const auto side = [&](int pixels) {
-    return std::max(1, static_cast<int>(std::lround(pixels / factor)));
-  };
-  return resized(camera, side(camera.width), side(camera.height));
-}
-
 // Those beside input views that stand at a small angle from one, around what that one looks at.
 void add_cameras_beside(const Model& model, std::vector<Camera>& out) {
   constexpr double kBeside = 20.5 * std::numbers::pi / 180;
-  std::vector<std::optional<Eigen::Vector3d>> subjects;
-  for (size_t k = 0; k < model.priors.size(); ++k) subjects.push_back(looked_at(model, k));
+  const Subjects subjects = subjects_of(model);
   for (const NextView& place : places_around(model, model.priors.size())) {
-    double least = std::numeric_limits<double>::infinity();
-    for (size_t k = 0; k < subjects.size(); ++k) {
-      if (!subjects[k]) continue;
-      const Eigen::Vector3d from = input_camera(model, k).center() - *subjects[k];
-      least = std::min(least, angle_between(from, place.camera.center() - *subjects[k]));
-    }
-    if (least <= kBeside) out.push_back(place.camera);
+    const auto nearest = nearest_input(model, subjects, place.camera.center());
+    if (nearest && nearest->angle <= kBeside) out.push_back(place.camera);
   }
 }
 
@@ -74,7 +54,8 @@ struct SeenHoles {
 };
 
 SeenHoles holes_of(const Model& model, const std::vector<SupportView>& inputs, const Camera& from) {
-  SeenHoles out{coarse(from), {}};
+  constexpr int kSide = 120;  // [pixels]; which holes a camera sees needs no detail
+  SeenHoles out{resized_to_fit(from, kSide), {}};
   const RenderBuffers buffers = render_camera(model, inputs, out.camera);
   MaskMap open(out.camera.width, out.camera.height, 0);
   for (size_t i = 0; i < open.data.size(); ++i)

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "libcgs/core/angle_between.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/render/rasterizer.h"
 
@@ -21,6 +23,25 @@ std::optional<Eigen::Vector3d> looked_at(const Model& model, size_t input) {
   if (known.empty()) return std::nullopt;
   const Camera& camera = input_camera(model, input);
   return camera.unproject(0.5 * camera.width, 0.5 * camera.height, double{median(known)});
+}
+
+Subjects subjects_of(const Model& model) {
+  Subjects out;
+  for (size_t k = 0; k < model.priors.size(); ++k) out.push_back(looked_at(model, k));
+  return out;
+}
+
+std::optional<NearestInput> nearest_input(const Model& model,
+                                          const Subjects& subjects,
+                                          const Eigen::Vector3d& place) {
+  std::optional<NearestInput> out;
+  for (size_t k = 0; k < subjects.size(); ++k) {
+    if (!subjects[k]) continue;
+    const Eigen::Vector3d from = input_camera(model, k).center() - *subjects[k];
+    const double angle = angle_between(from, place - *subjects[k]);
+    if (angle < (out ? out->angle : std::numeric_limits<double>::infinity())) out = {k, angle};
+  }
+  return out;
 }
 
 EvidenceMap evidence_of(const ViewPriors& priors) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,6 +31,23 @@ const Camera& input_camera(const Model& model, size_t input);
 /// The point that an input view looks at: in the middle of its picture, at the median of its depth
 /// [internal units]; nothing where no depth is known.
 std::optional<Eigen::Vector3d> looked_at(const Model& model, size_t input);
+
+/// looked_at() of every input view.
+using Subjects = std::vector<std::optional<Eigen::Vector3d>>;
+Subjects subjects_of(const Model& model);
+
+/// An input view as seen from somewhere else.
+struct NearestInput {
+  size_t input = 0;  ///< Position in scene.input.
+  double angle = 0;  ///< Between the two around what it looks at [rad].
+};
+
+/// The input view at the least angle from a place; the first of equal ones, nothing if none is
+/// known to look at anything.
+/// \param subjects  of the model
+std::optional<NearestInput> nearest_input(const Model& model,
+                                          const Subjects& subjects,
+                                          const Eigen::Vector3d& place);
 
 /// What vouches for the depth of every pixel of a view.
 EvidenceMap evidence_of(const ViewPriors& priors);

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
-#include <optional>
 
 #include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
@@ -17,26 +15,9 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// What each input view looks at.
-std::vector<std::optional<Eigen::Vector3d>> subjects(const Model& model) {
-  std::vector<std::optional<Eigen::Vector3d>> out;
-  for (size_t k = 0; k < model.priors.size(); ++k) out.push_back(looked_at(model, k));
-  return out;
-}
-
-// Small enough to rank many, large enough to show what is open.
-Camera small(const Camera& camera) {
-  constexpr int kSide = 160;  // [pixels]
-  const double factor = double(std::max(camera.width, camera.height)) / kSide;
-  if (factor <= 1) return camera;
-  const auto side = [&](int pixels) {
-    return std::max(1, static_cast<int>(std::lround(pixels / factor)));
-  };
-  return resized(camera, side(camera.width), side(camera.height));
-}
-
 void judge(const Model& model, const std::vector<SupportView>& inputs, NextView& view) {
-  const RenderBuffers buffers = render_camera(model, inputs, small(view.camera));
+  constexpr int kSide = 160;  // [pixels]; small enough to rank many, large enough to show the open
+  const RenderBuffers buffers = render_camera(model, inputs, resized_to_fit(view.camera, kSide));
   size_t open = 0;
   size_t unsure = 0;
   size_t shared = 0;
@@ -54,28 +35,22 @@ void judge(const Model& model, const std::vector<SupportView>& inputs, NextView&
 }
 
 // Where it stands, as seen from the nearest input view, around what that looks at.
-void place(const Model& model,
-           const std::vector<std::optional<Eigen::Vector3d>>& subjects,
-           NextView& view) {
-  double least = std::numeric_limits<double>::infinity();
-  for (size_t k = 0; k < subjects.size(); ++k) {
-    if (!subjects[k]) continue;
-    const Camera& input = input_camera(model, k);
-    const Eigen::Vector3d from = input.center() - *subjects[k];
-    const Eigen::Vector3d to = view.camera.center() - *subjects[k];
-    const double angle = angle_between(from, to);
-    if (!(angle < least)) continue;
-    least = angle;
-    view.nearest = k;
-    view.farther = to.norm() / from.norm();
-    const Eigen::Vector3d own = input.world_from_cam.rotation().transpose() * to;
-    const Eigen::Vector3d before = input.world_from_cam.rotation().transpose() * from;
-    // About the axes of its picture; y is down, and z looks away from the camera.
-    view.right = std::atan2(own.x(), -own.z()) - std::atan2(before.x(), -before.z());
-    view.higher = std::atan2(-own.y(), std::hypot(own.x(), own.z())) -
-                  std::atan2(-before.y(), std::hypot(before.x(), before.z()));
-  }
-  view.right = std::remainder(view.right, 2 * std::numbers::pi);
+void place(const Model& model, const Subjects& subjects, NextView& view) {
+  const auto nearest = nearest_input(model, subjects, view.camera.center());
+  if (!nearest) return;
+  view.nearest = nearest->input;
+  const Camera& input = input_camera(model, view.nearest);
+  const Eigen::Vector3d& around = *subjects[view.nearest];
+  const Eigen::Vector3d from = input.center() - around;
+  const Eigen::Vector3d to = view.camera.center() - around;
+  view.farther = to.norm() / from.norm();
+  const Eigen::Vector3d own = input.world_from_cam.rotation().transpose() * to;
+  const Eigen::Vector3d before = input.world_from_cam.rotation().transpose() * from;
+  // About the axes of its picture; y is down, and z looks away from the camera.
+  view.right = std::remainder(std::atan2(own.x(), -own.z()) - std::atan2(before.x(), -before.z()),
+                              2 * std::numbers::pi);
+  view.higher = std::atan2(-own.y(), std::hypot(own.x(), own.z())) -
+                std::atan2(-before.y(), std::hypot(before.x(), before.z()));
 }
 
 // An input camera turned around a point, about the axes of its picture.
@@ -99,7 +74,7 @@ std::vector<NextView> rank_next_views(const Model& model,
           "what to photograph next is told by the input views of a model; the number of these",
           model.priors.size());
   const std::vector<SupportView> inputs = support_views(model);
-  const auto seen = subjects(model);
+  const Subjects seen = subjects_of(model);
   for (size_t i = 0; i < candidates.size(); ++i) {
     report(progress, double(i) / double(candidates.size()));
     judge(model, inputs, candidates[i]);
@@ -112,7 +87,7 @@ std::vector<NextView> rank_next_views(const Model& model,
 }
 
 std::vector<NextView> places_around(const Model& model, size_t most_views) {
-  const auto seen = subjects(model);
+  const Subjects seen = subjects_of(model);
   std::vector<size_t> looking;
   for (size_t k = 0; k < seen.size(); ++k) {
     if (seen[k]) looking.push_back(k);
@@ -134,7 +109,7 @@ std::vector<NextView> places_around(const Model& model, size_t most_views) {
 
 std::vector<NextView> apart(const Model& model, const std::vector<NextView>& ranked, size_t count) {
   constexpr double kApart = 15 * kDegree;
-  const auto seen = subjects(model);
+  const Subjects seen = subjects_of(model);
   std::vector<NextView> out;
   for (const NextView& view : ranked) {
     const Eigen::Vector3d& around = *seen[view.nearest];

@@ -33,6 +33,19 @@ TEST(Camera, ResizedProjectsToTheSamePlaceInThePicture) {
   EXPECT_NEAR(half.project(point).y(), 5, 1e-12);
 }
 
+TEST(Camera, ResizedToFitHasTheLongerSideThatIsAskedForOrStays) {
+  const Camera camera = tilted_camera();  // 64 x 48
+  const Camera small = resized_to_fit(camera, 16);
+  EXPECT_EQ(small.width, 16);
+  EXPECT_EQ(small.height, 12);
+  EXPECT_NEAR(small.project(camera.unproject(20, 10, 4)).x(), 5, 1e-12);
+  const Camera sliver = resized_to_fit(resized(camera, 1, 400), 100);
+  EXPECT_EQ(sliver.width, 1) << "never nothing";
+  EXPECT_EQ(sliver.height, 100);
+  EXPECT_EQ(resized_to_fit(camera, 64).fx, camera.fx);
+  EXPECT_EQ(resized_to_fit(camera, 200).width, camera.width);
+}
+
 // Depth along the rays of a plane n.p = d.
 DepthMap plane_depth(const Camera& camera, const Eigen::Vector3d& n, double d) {
   DepthMap depth(camera.width, camera.height, 0.0f);

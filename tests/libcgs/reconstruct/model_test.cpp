@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/reconstruct/model.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
+
+#include "tests/support/camera_row.h"
 
 namespace cgs::reconstructed_model_test {
 namespace {
@@ -25,6 +29,20 @@ TEST(SupportViews, AreTheInputViewsWithWhatVouchesForTheirDepth) {
   EXPECT_EQ(views[0].evidence(1, 0), DepthEvidence::Sky);
   model.priors.clear();  // as of splats of other programs
   EXPECT_TRUE(support_views(model).empty());
+}
+
+TEST(NearestInput, StandsAtTheLeastAngleAroundWhatItLooksAt) {
+  Model model = test::row_of_cameras();
+  model.priors[1].depth = DepthMap(40, 30, std::nanf(""));  // looks at nothing that is known
+  const Subjects subjects = subjects_of(model);
+  ASSERT_EQ(subjects.size(), 3u);
+  EXPECT_FALSE(subjects[1].has_value());
+  const auto nearest = nearest_input(model, subjects, {0.4, 0, 0});
+  ASSERT_TRUE(nearest.has_value());
+  EXPECT_EQ(nearest->input, 2u);
+  EXPECT_NEAR(nearest->angle, std::atan2(0.6, 5), 1e-6);
+  EXPECT_EQ(nearest_input(model, subjects, {0, 0, 0})->input, 0u) << "the first of equal ones";
+  EXPECT_FALSE(nearest_input(model, Subjects(3), {0, 0, 0}).has_value());
 }
 
 }  // namespace
