@@ -403,4 +403,19 @@ void set_backdrop(std::vector<ViewPriors>& views) {
   }
 }
 
+std::optional<float> median_depth(std::span<const ViewPriors> views) {
+  std::vector<float> of_surfaces;
+  std::vector<float> of_sky;
+  for (const ViewPriors& view : views) {
+    for (size_t i = 0; i < view.depth.data.size(); ++i) {
+      const float z = view.depth.data[i];
+      if (!(z > 0) || !std::isfinite(z)) continue;
+      (view.origin.data[i] == DepthOrigin::Sky ? of_sky : of_surfaces).push_back(z);
+    }
+  }
+  std::vector<float>& depths = of_surfaces.empty() ? of_sky : of_surfaces;
+  if (depths.empty()) return std::nullopt;
+  return median(depths);
+}
+
 }  // namespace cgs

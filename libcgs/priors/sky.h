@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "libcgs/core/scene.h"
@@ -32,5 +34,9 @@ void enter_sky(const MaskMap& sky, ViewPriors& priors);
 
 /// Gives sky the depth of a backdrop, far behind everything that was measured in any view.
 void set_backdrop(std::vector<ViewPriors>& views);
+
+/// Median depth of the pixels of all these views that show a surface [internal units], or of the
+/// backdrop where nothing but sky has a depth; nothing where no pixel has one.
+std::optional<float> median_depth(std::span<const ViewPriors> views);
 
 }  // namespace cgs

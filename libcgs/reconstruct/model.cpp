@@ -2,11 +2,11 @@
 #include "libcgs/reconstruct/model.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
+#include <span>
 
 #include "libcgs/core/angle_between.h"
-#include "libcgs/core/order_statistics.h"
+#include "libcgs/priors/sky.h"
 #include "libcgs/render/rasterizer.h"
 
 namespace cgs {
@@ -16,13 +16,10 @@ const Camera& input_camera(const Model& model, size_t input) {
 }
 
 std::optional<Eigen::Vector3d> looked_at(const Model& model, size_t input) {
-  std::vector<float> known;
-  for (const float z : model.priors.at(input).depth.data) {
-    if (std::isfinite(z)) known.push_back(z);
-  }
-  if (known.empty()) return std::nullopt;
+  const std::optional<float> depth = median_depth(std::span(&model.priors.at(input), 1));
+  if (!depth) return std::nullopt;
   const Camera& camera = input_camera(model, input);
-  return camera.unproject(0.5 * camera.width, 0.5 * camera.height, double{median(known)});
+  return camera.unproject(0.5 * camera.width, 0.5 * camera.height, double{*depth});
 }
 
 Subjects subjects_of(const Model& model) {

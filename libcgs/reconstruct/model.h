@@ -28,7 +28,7 @@ struct Model {
 /// Camera of an input view, by its position in scene.input.
 const Camera& input_camera(const Model& model, size_t input);
 
-/// The point that an input view looks at: in the middle of its picture, at the median of its depth
+/// The point that an input view looks at: in the middle of its picture, at its median_depth()
 /// [internal units]; nothing where no depth is known.
 std::optional<Eigen::Vector3d> looked_at(const Model& model, size_t input);
 

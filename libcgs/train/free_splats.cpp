@@ -12,6 +12,7 @@
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/kd_tree.h"
+#include "libcgs/priors/sky.h"
 #include "libcgs/render/projection_gradient.h"
 #include "libcgs/train/losses.h"
 #include "libcgs/train/training_inputs.h"
@@ -136,7 +137,7 @@ FreeSplats::FreeSplats(const Scene& scene,
     cameras.push_back(view.camera);
     most_ += view.image.data.size();
   }
-  extent_ = std::max(extent_of(cameras), median_depth(priors));
+  extent_ = std::max(extent_of(cameras), median_depth(priors).value_or(1));
   density_.is_from_splats = start.has_value();
   gaussians_ = start ? std::move(*start) : measured_points(scene, priors);
   gaussians_.provenance.clear();  // who vouched for a place does not for where it moves

@@ -11,6 +11,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/remedy.h"
+#include "libcgs/priors/sky.h"
 #include "libcgs/train/learning_rate.h"
 #include "libcgs/train/losses.h"
 #include "libcgs/train/picture_terms.h"
@@ -127,7 +128,7 @@ Trainer::Trainer(const Scene& scene,
   }
   if (options.color_rate > 0) model_.free_colors();
   states_.resize(model_.parameters.size());
-  disparity_unit_ = median_depth(priors);
+  disparity_unit_ = median_depth(priors).value_or(1);
   model_.decode();
 }
 

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/train/training_inputs.h"
 
-#include <algorithm>
-#include <cmath>
-#include <iterator>
-
-#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/split_mix.h"
 
 namespace cgs {
@@ -17,17 +12,6 @@ ColorPlanes planes_of(const ColorImage& image) {
     for (size_t i = 0; i < image.data.size(); ++i) out[c].data[i] = image.data[i][c];
   }
   return out;
-}
-
-float median_depth(const std::vector<ViewPriors>& priors) {
-  std::vector<float> all;
-  for (const ViewPriors& p : priors) {
-    std::copy_if(p.depth.data.begin(), p.depth.data.end(), std::back_inserter(all), [](float z) {
-      return z > 0 && std::isfinite(z);
-    });
-  }
-  if (all.empty()) return 1;
-  return median(all);
 }
 
 uint64_t mixed(uint64_t a, uint64_t b, uint64_t c) {

@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include <Eigen/Core>
 
 #include "libcgs/core/raster.h"
-#include "libcgs/priors/view_priors.h"
 #include "libcgs/render/training_rasterizer.h"
 
 namespace cgs {
 
 /// The three channels of a photograph, as the losses take them.
 ColorPlanes planes_of(const ColorImage& image);
-
-/// Median depth of all pixels of the input views that have one [internal units]; 1 where none has.
-float median_depth(const std::vector<ViewPriors>& priors);
 
 /// A well-mixed number for a triple of counters: what a step does must not depend on what ran
 /// before.

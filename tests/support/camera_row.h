@@ -19,6 +19,7 @@ inline Model row_of_cameras() {
     out.scene.input.push_back(i);
     out.priors.emplace_back();
     out.priors.back().depth = DepthMap(40, 30, 5);
+    out.priors.back().origin = Raster<DepthOrigin>(40, 30, DepthOrigin::Measured);
   }
   out.scene.frame.up = -Eigen::Vector3d::UnitY();
   return out;

@@ -393,6 +393,24 @@ TEST(SetBackdrop, PutsTheSkyOfAllViewsFarBehindWhatWasMeasured) {
   }
 }
 
+TEST(MedianDepth, IsOfSurfacesWhereverThereAreSome) {
+  ViewPriors view;
+  view.depth = DepthMap(5, 1, 40);
+  view.depth.data = {40, 2, 40, 3, 40};
+  view.origin = Raster<DepthOrigin>(5, 1, DepthOrigin::Sky);
+  EXPECT_EQ(median_depth(std::vector{view}), 40) << "there is nothing else";
+  view.origin(1, 0) = DepthOrigin::Measured;
+  view.origin(3, 0) = DepthOrigin::Completed;
+  EXPECT_EQ(median_depth(std::vector{view}), 3);
+  ViewPriors other = view;
+  other.depth = DepthMap(5, 1, 40);
+  other.origin = Raster<DepthOrigin>(5, 1, DepthOrigin::Measured);
+  EXPECT_EQ(median_depth(std::vector{view, other}), 40) << "a wall that is as far away";
+  view.depth = DepthMap(5, 1, std::nanf(""));
+  EXPECT_FALSE(median_depth(std::vector{view}).has_value());
+  EXPECT_FALSE(median_depth({}).has_value());
+}
+
 TEST(SetBackdrop, LeavesSkyOpenWhereNothingWasMeasured) {
   Photo photo = sky_above_ground(blue);
   enter_sky(photo.truth, photo.priors);
