@@ -10,6 +10,8 @@
 
 #include "io/images/image.h"
 #include "libcgs/core/error.h"
+#include "libcgs/priors/neighbours.h"
+#include "libcgs/priors/pixel_matches.h"
 
 namespace cgs {
 
@@ -87,6 +89,12 @@ double of_free_splats(SplatMethod method, double pixels) {
   return method == SplatMethod::Classical ? kOfPixel * pixels : 0;
 }
 
+// What the flow term holds: where each pixel lies in the views that its own is compared with.
+double of_flow(bool has_flow, size_t views, double pixels) {
+  const size_t compared = std::min(std::max<size_t>(views, 1) - 1, kMostCompared);
+  return has_flow ? double(sizeof(PixelMatch) * compared) * pixels : 0;
+}
+
 constexpr size_t kUnlimited = std::numeric_limits<size_t>::max();
 
 size_t free_of_machine() {
@@ -143,7 +151,8 @@ std::vector<StageMemory> memory_plan(const Scene& scene, const PictureWork& work
         f.base + f.of_pixel * input.all + f.of_largest * largest + of_voxel * voxel_pixels;
     if (stage.id == Stage::Model) {
       bytes += of_networks(work.coherence, scene.input.size(), input.all) +
-               of_free_splats(work.method, input.all);
+               of_free_splats(work.method, input.all) +
+               of_flow(work.has_flow, scene.input.size(), input.all);
     }
     // The report shows photographs beside all that it holds; other stages read them before.
     bytes = stage.id == Stage::Report ? bytes + std::max(reading_input, reading_held_out)
@@ -193,6 +202,7 @@ void check_training_memory(const Scene& scene, size_t budget, const TrainingOpti
                        {.chooses_voxels = false,
                         .coherence = training.coherence,
                         .method = training.method,
+                        .has_flow = training.flow_weight > 0,
                         .downscale = factor})
         .front();
   });

@@ -34,7 +34,8 @@ struct PictureWork {
   MeasuredFiles measured = {};
   CoherenceOptions coherence = {};  ///< Of the training: networks hold much more than lattices.
   SplatMethod method = SplatMethod::Coherent;  ///< Free Gaussians hold more each.
-  int downscale = 1;                           ///< Divides the sides of the pictures once more.
+  bool has_flow = false;  ///< The training keeps which pixels of neighbours correspond.
+  int downscale = 1;      ///< Divides the sides of the pictures once more.
 };
 
 /// Predicts what the stages of a run will need, from the sizes of its pictures alone.

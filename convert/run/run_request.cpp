@@ -17,7 +17,8 @@ PictureWork picture_work(const RunRequest& request) {
           .measured = {.meshes = !request.max_error.empty(),
                        .asset = !request.max_error.empty() || request.max_size > 0},
           .coherence = request.training.coherence,
-          .method = request.training.method};
+          .method = request.training.method,
+          .has_flow = request.training.flow_weight > 0};
 }
 
 void check_lengths(const RunRequest& request, Frame frame) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/pixel_matches.h"
 
 namespace cgs {
@@ -35,8 +36,7 @@ DepthTerms::DepthTerms(const Scene& scene,
                        const TrainingOptions& options)
     : options_(options), given_(priors.size()) {
   for (size_t i = 0; i < priors.size() && options.flow_weight > 0; ++i) {
-    for (size_t j = 0; j < priors.size(); ++j) {
-      if (i == j) continue;
+    for (const size_t j : neighbours(scene, i, kMostCompared)) {
       // An optical flow, which the flow loss was published with, would also match what the sweep
       // could not measure.
       pairs_.push_back(

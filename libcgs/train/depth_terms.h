@@ -44,7 +44,7 @@ class DepthTerms {
     bool is_disparity = false;
   };
   TrainingOptions options_;
-  std::vector<Pair> pairs_;   // empty unless the flow term has a weight
+  std::vector<Pair> pairs_;   // of neighbours; empty unless the flow term has a weight
   std::vector<Given> given_;  // per view
 };
 

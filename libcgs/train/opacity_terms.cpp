@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/priors/neighbours.h"
 #include "libcgs/train/losses.h"
 
 namespace cgs {
@@ -21,7 +22,8 @@ double nearest_measured(const ViewPriors& priors) {
 
 }  // namespace
 
-OpacityTerms::OpacityTerms(const CoherentGaussians& model,
+OpacityTerms::OpacityTerms(const Scene& scene,
+                           const CoherentGaussians& model,
                            const std::vector<ViewPriors>& priors,
                            const TrainingOptions& options)
     : options_(options) {
@@ -32,12 +34,11 @@ OpacityTerms::OpacityTerms(const CoherentGaussians& model,
   unmeasured_.resize(priors.size());
   for (size_t n = 0; n < priors.size(); ++n) {
     const CoherentGaussians::Range range = model.range(n);
+    const std::vector<size_t> others = neighbours(scene, n, kMostCompared);
     for (size_t g = range.first; g < range.last; ++g) {
       const auto pixel = static_cast<size_t>(model.pixel(n, g - range.first));
       if (priors[n].origin.data[pixel] == DepthOrigin::Measured) continue;
-      for (size_t other = 0; other < priors.size(); ++other) {
-        if (other != n) unmeasured_[other].push_back(static_cast<uint32_t>(g));
-      }
+      for (const size_t other : others) unmeasured_[other].push_back(static_cast<uint32_t>(g));
     }
   }
 }

@@ -6,6 +6,7 @@
 
 #include "libcgs/coherence/coherent_gaussians.h"
 #include "libcgs/core/gaussian_gradients.h"
+#include "libcgs/core/scene.h"
 #include "libcgs/priors/view_priors.h"
 #include "libcgs/train/step_report.h"
 #include "libcgs/train/training_options.h"
@@ -18,7 +19,8 @@ namespace cgs {
 class OpacityTerms {
  public:
   /// \param priors  in the order of the views of the model
-  OpacityTerms(const CoherentGaussians& model,
+  OpacityTerms(const Scene& scene,
+               const CoherentGaussians& model,
                const std::vector<ViewPriors>& priors,
                const TrainingOptions& options);
 
@@ -31,7 +33,8 @@ class OpacityTerms {
  private:
   TrainingOptions options_;
   std::vector<double> near_;  // per view; 0 = nothing is measured
-  /// Per view the Gaussians of others without measured depth; empty unless the term has a weight.
+  /// Per view the Gaussians without measured depth of those that it is a neighbour of; empty unless
+  /// the term has a weight.
   std::vector<std::vector<uint32_t>> unmeasured_;
 };
 

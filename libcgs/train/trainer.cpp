@@ -11,6 +11,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/remedy.h"
+#include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/sky.h"
 #include "libcgs/train/learning_rate.h"
 #include "libcgs/train/losses.h"
@@ -113,15 +114,14 @@ Trainer::Trainer(const Scene& scene,
       model_(model_of(scene, priors, options.coherence, pane)),
       full_(training_views(scene, priors)),
       depth_terms_(scene, priors, full_, options),
-      opacity_terms_(model_, priors, options),
+      opacity_terms_(scene, model_, priors, options),
       rasterizer_(TrainingRasterizerOptions{}) {
   options.validate();
   for (size_t n = 0; n < full_.size() && options.coarse_until > 0; ++n) {
     coarse_.push_back(halved(full_[n]));
   }
-  for (size_t i = 0; i < full_.size(); ++i) {
-    if (!(options.virtual_weight > 0 || options.virtual_tv_weight > 0)) break;
-    for (size_t j = i + 1; j < full_.size(); ++j) {
+  if (options.virtual_weight > 0 || options.virtual_tv_weight > 0) {
+    for (const auto& [i, j] : neighbouring_pairs(scene)) {
       between_.push_back(
           {i, j, pixel_matches(full_[i].camera, priors[i], full_[j].camera, priors[j])});
     }

@@ -66,7 +66,7 @@ class Trainer {
   CoherentGaussians model_;
   std::vector<TrainingView> full_;    // per input view
   std::vector<TrainingView> coarse_;  // at half size; empty unless the schedule has a coarse part
-  std::vector<Between> between_;      // pairs of views; empty unless virtual views have a weight
+  std::vector<Between> between_;      // neighbours; empty unless virtual views have a weight
   DepthTerms depth_terms_;
   OpacityTerms opacity_terms_;
   TrainingRasterizer rasterizer_;

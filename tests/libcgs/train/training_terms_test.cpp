@@ -80,6 +80,21 @@ TEST(TrainingTerms, SurviveAnInterruption) {
   EXPECT_TRUE(test::same_bits(resumed.model().gaussians(), trained(scene, options)));
 }
 
+// Each with its best neighbours only, so that lists of pairs grow with the number of views.
+TEST(TrainingTerms, TakeMoreViewsThanEachIsComparedWith) {
+  std::vector<double> places;
+  for (int k = 0; k < 12; ++k) places.push_back(0.04 * k - 0.22);
+  const test::PlantedScene scene = test::planted_scene(0.02, places);
+  TrainingOptions options = test::short_training(2);
+  options.flow_weight = options.virtual_weight = options.seen_through_weight = 0.5;
+  Trainer trainer(scene.scene, scene.priors, options);
+  test::run(trainer);
+  for (const StepReport& report : trainer.history()) {
+    EXPECT_GT(report.flow, 0);
+    EXPECT_GT(report.related, 0);
+  }
+}
+
 TEST(TrainingTerms, StayWhereTheyMustWhenImagesAreDrawnLargerOrSmaller) {
   const test::PlantedScene scene = scene_for_all_terms();
   for (const char* field : {"coarse_until", "sharp_from"}) {
