@@ -122,6 +122,8 @@ Trainer::Trainer(const Scene& scene,
   }
   if (options.virtual_weight > 0 || options.virtual_tv_weight > 0) {
     for (const auto& [i, j] : neighbouring_pairs(scene)) {
+      // Between them colours would be those of a grey photograph, at least in part.
+      if (full_[i].is_grey || full_[j].is_grey) continue;
       between_.push_back(
           {i, j, pixel_matches(full_[i].camera, priors[i], full_[j].camera, priors[j])});
     }

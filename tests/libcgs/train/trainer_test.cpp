@@ -317,6 +317,21 @@ TEST(Trainer, TakesNoColorsFromAGreyPhotograph) {
   EXPECT_LT(chroma[0], chroma[1] - 0.05 * wanted);
 }
 
+// Nor does a place between it and another one, where its colours would be half of them.
+TEST(Trainer, LooksFromNowhereBesideAGreyPhotograph) {
+  PlantedScene planted = planted_scene(0.01, {-0.06, 0.06});
+  TrainingOptions options = short_training(3);
+  const auto trained = [&](double weight) {
+    options.virtual_weight = weight;
+    Trainer trainer(planted.scene, planted.priors, options);
+    run(trainer);
+    return trainer.model().gaussians();
+  };
+  EXPECT_FALSE(same_bits(trained(0), trained(0.5)));
+  planted.scene.views[1].response.is_grey = true;
+  EXPECT_TRUE(same_bits(trained(0), trained(0.5)));
+}
+
 // Completed depth tells of no surface, and colours there would fit one photograph alone.
 TEST(Trainer, ColoursStayWhereDepthIsNotMeasured) {
   PlantedScene planted = planted_scene(0.02);
