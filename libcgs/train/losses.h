@@ -95,14 +95,21 @@ double depth_spread(const TrainingBuffers& rendered,
 /// Source: Seo et al. 2023, "FlipNeRF", emptiness; here the quadratic form of it.
 double emptiness(const TrainingBuffers& rendered, double weight, TrainingBuffers& gradient);
 
-/// Mean over all Gaussians of the opacity of those that a camera sees nearer than `near`.
+/// Where nothing is to stand before a camera.
+struct SpaceBefore {
+  const Camera& camera;
+  double near;  ///< Up to this z-depth [internal units]; >= 0.
+};
+
+/// Mean over the first `count` Gaussians of the opacity of those that a camera sees nearer than
+/// `near`.
 ///
-/// \param near      z-depth [internal units]; >= 0
+/// \param count     at most that of all; those behind it, such as a pane, may stand anywhere
 /// \param gradient  with respect to the opacities; one entry per Gaussian, or empty
 /// Source: Yang et al. 2023, "FreeNeRF", occlusion regularisation.
 double near_opacity(const Gaussians& gaussians,
-                    const Camera& camera,
-                    double near,
+                    size_t count,
+                    const SpaceBefore& space,
                     double weight,
                     std::vector<float>& gradient);
 

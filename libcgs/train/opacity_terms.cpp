@@ -50,10 +50,11 @@ void OpacityTerms::add(const CoherentGaussians& model,
   constexpr double kNearShare = 0.8;  // of the nearest measured depth
   const auto count = double(views.size());
   const Gaussians& gaussians = model.gaussians();
+  const size_t of_views = model.range(views.size() - 1).last;  // a pane stands where it was found
   for (size_t n = 0; n < views.size(); ++n) {
     report.related += near_opacity(gaussians,
-                                   views[n].camera,
-                                   kNearShare * near_[n],
+                                   of_views,
+                                   {views[n].camera, kNearShare * near_[n]},
                                    options_.near_opacity_weight / count,
                                    sum.opacity);
     if (unmeasured_.empty()) continue;
