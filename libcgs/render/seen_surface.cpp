@@ -147,6 +147,8 @@ class Canvas {
     const double y0 = std::max(first(a.y(), b.y(), c.y()), 0.0);
     const double x1 = std::min(last(a.x(), b.x(), c.x()), double(pixel_.width - 1));
     const double y1 = std::min(last(a.y(), b.y(), c.y()), double(pixel_.height - 1));
+    // Close before the camera, corners may lie farther beside the picture than an int can say.
+    if (!(x0 <= x1 && y0 <= y1)) return;
     const Eigen::Vector2d ab = (b - a).head<2>();
     const Eigen::Vector2d ac = (c - a).head<2>();
     const double area = Canvas::area(a, b, c);

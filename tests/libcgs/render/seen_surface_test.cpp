@@ -143,6 +143,13 @@ TEST(SeenSurface, HasNoBack) {
   for (const float z : surface.depth.data) EXPECT_TRUE(std::isnan(z));
 }
 
+// Corners of its cells are up to 1e11 pixels away.
+TEST(SeenSurface, EndsWhereTheCameraAllButTouchesIt) {
+  const Camera camera = camera_at({0, 0, 0});
+  const SeenSurface surface = seen(camera, DepthMap(80, 60, 1), camera_at({0, 0, 1 - 1e-10}));
+  for (const int32_t pixel : surface.pixel.data) ASSERT_EQ(pixel, -1);
+}
+
 TEST(SeenSurface, LeavesOutWhatLiesBehindTheCamera) {
   const Camera camera = camera_at({0, 0, 0});
   const SeenSurface surface = seen(camera, DepthMap(80, 60, 1), camera_at({0, 0, 2}));
