@@ -5,7 +5,8 @@
 
 namespace cgs {
 
-/// What one step did: each term already multiplied by its weight, summed over views.
+/// What one step did: each term already multiplied by its weight. Those on pictures are means over
+/// the views that the step drew, all others over all views.
 struct StepReport {
   double l1 = 0;
   double ssim = 0;

@@ -14,9 +14,9 @@ namespace cgs {
 /// nothing holds together (FreeSplats), the control that coherence is measured against.
 enum class SplatMethod { Coherent, Classical };
 
-/// How a model is trained. One step looks at all input views. Points in time are fractions of the
-/// whole schedule. Rates are per step: with lattices, a run of more steps goes further, and is not
-/// the same run more slowly.
+/// How a model is trained. One step looks at all input views, of more than four at the next four.
+/// Points in time are fractions of the whole schedule. Rates are per step: with lattices, a run of
+/// more steps goes further, and is not the same run more slowly.
 struct TrainingOptions {
   SplatMethod method =
       SplatMethod::Coherent;  ///< Classical takes a few fields, as FreeSplats says.
@@ -45,9 +45,9 @@ struct TrainingOptions {
   double tv_weight = 0;         ///< Total variation of the rendered disparity.
   double masked_tv_weight = 0;  ///< The same within layers.
   double tv_to_layers = 0;      ///< Share of tv_weight that moves to the layers until the end.
-  /// Distance of corresponding points [scene extents]. They correspond by the measured depth of the
-  /// views, not by an optical flow: the term holds together what the plane sweep found, and tells
-  /// nothing new.
+  /// Distance of corresponding points, per internal unit, of which the scene is half to one wide
+  /// (Frame). They correspond by the measured depth of the views, not by an optical flow: the term
+  /// holds together what the plane sweep found, and tells nothing new.
   double flow_weight = 0;
   double prior_weight = 0.002;  ///< Departure of measured depths from their prior, in sigmas. With
                                 ///< less, rounding decides where photographs hardly determine
@@ -82,14 +82,15 @@ struct TrainingOptions {
 /// - "draft", "standard" and "fine": lattices, a third, all and twice the steps;
 /// - "reference": the schedule that CoherentGS was published with, as far as it has a meaning here.
 ///   Networks; balls for 8/13 of the time, drawn at twice the size from 5/13 on; its losses but the
-///   perceptual one; no prior that holds depth or opacity. A step here looks at all views, so the
-///   13 000 steps of one view each are 4333, with rates higher by the root of three. Where paper
-///   and implementation differ, the paper: total variation goes over to layers from none to all
-///   (as a mean over pairs within layers, not over all five), the flow term counts in full.
+///   perceptual one; no prior that holds depth or opacity. A step here looks at all of three views,
+///   so the 13 000 steps of one view each are 4333, with rates higher by the root of three. Where
+///   paper and implementation differ, the paper: total variation goes over to layers from none to
+///   all (as a mean over pairs within layers, not over all five), the flow term counts in full.
 ///   What remains of this program: correspondences of the flow term from measured depth where
-///   theirs are from an optical flow, as a mean over the pixels of all pairs of views; a background
-///   of another colour in each step; drawing at twice the size along each axis; a change of depth
-///   that is bounded by max_depth_change; steps and rates for three views, however many there are.
+///   theirs are from an optical flow, as a mean over the pixels of all pairs of neighbours; a
+///   background of another colour in each step; drawing at twice the size along each axis; a change
+///   of depth that is bounded by max_depth_change; steps and rates for three views, however many
+///   there are.
 /// - "classical": 3D Gaussian Splatting as published in 2023, without coherence, a tenth of its
 /// steps
 ///   of one view each (FreeSplats).
