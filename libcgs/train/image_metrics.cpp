@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/halved.h"
 
 namespace cgs {
 
@@ -149,18 +150,6 @@ Means means_inside(const ColorImage& a, const ColorImage& b) {
 }
 
 bool holds_a_window(int width, int height) { return std::min(width, height) >= kTaps; }
-
-// Means of 2x2 pixels; an odd last row or column is left out.
-ColorImage halved(const ColorImage& image) {
-  ColorImage out(image.width / 2, image.height / 2, Eigen::Vector3f::Zero());
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) {
-      out(x, y) = 0.25f * (image(2 * x, 2 * y) + image(2 * x + 1, 2 * y) + image(2 * x, 2 * y + 1) +
-                           image(2 * x + 1, 2 * y + 1));
-    }
-  }
-  return out;
-}
 
 }  // namespace
 

@@ -22,7 +22,8 @@ Raster<float> difference(const Raster<float>& a, const Raster<float>& b, const M
   return out;
 }
 
-// The mean of differences is the difference of means: one pyramid serves both images.
+// The mean of differences is the difference of means: one pyramid serves both images. Sums here are
+// taken in another order than those of halved(), which every training keeps its bits by.
 Raster<float> half(const Raster<float>& fine) {
   Raster<float> out(fine.width / 2, fine.height / 2, 0);
   if (out.empty()) return out;

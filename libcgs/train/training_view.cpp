@@ -63,17 +63,6 @@ TrainingView training_view(const View& view, const ViewPriors& priors) {
   return out;
 }
 
-Raster<float> halved(const Raster<float>& in) {
-  Raster<float> out(in.width / 2, in.height / 2, 0);
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) {
-      out(x, y) = 0.25f * (in(2 * x, 2 * y) + in(2 * x + 1, 2 * y) + in(2 * x, 2 * y + 1) +
-                           in(2 * x + 1, 2 * y + 1));
-    }
-  }
-  return out;
-}
-
 TrainingView halved(const TrainingView& view) {
   TrainingView out{halved(view.camera),
                    {},

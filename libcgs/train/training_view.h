@@ -2,6 +2,7 @@
 #pragma once
 
 #include "libcgs/core/camera.h"
+#include "libcgs/core/halved.h"
 #include "libcgs/core/raster.h"
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/view_priors.h"
@@ -26,9 +27,6 @@ TrainingView training_view(const View& view, const ViewPriors& priors);
 /// The view at half its size. Colours are means of four pixels, of which all must be usable; of
 /// layers and depth every other pixel is taken. Odd rows and columns at the end are cut off.
 TrainingView halved(const TrainingView& view);
-
-/// Means of 2 x 2 values; odd rows and columns are left out. Empty stays empty.
-Raster<float> halved(const Raster<float>& in);
 
 /// The derivative with respect to an image whose 2x2 means the loss was taken of. Empty stays
 /// empty.
