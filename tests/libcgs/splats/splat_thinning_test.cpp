@@ -52,7 +52,7 @@ Eigen::Vector3f striped_color(const Eigen::Vector3d& p) {
   return wall_color(p) + (on_stripe(p) ? kStripe : Eigen::Vector3f::Zero());
 }
 
-/// A wall at depth 1 with a splat per pixel of each of three photographs, and a margin beyond them.
+/// A wall at depth 1 with a splat per pixel of each of some photographs, and a margin beyond them.
 /// These are what all splats show, and noise.
 struct WallScene {
   Scene scene;
@@ -61,7 +61,8 @@ struct WallScene {
 };
 
 struct WallOptions {
-  double noise = 0;      // uniform, +-
+  double noise = 0;  // uniform, +-
+  int views = 3;
   int side = kSide;      // of the photographs [pixels]
   double radius = 1e9;   // of a disc that the wall is cut to
   double step = 0.0621;  // between the cameras
@@ -70,7 +71,7 @@ struct WallOptions {
 
 WallScene wall_scene(const WallOptions& o) {
   WallScene out;
-  for (int n = 0; n < 3; ++n) {
+  for (int n = 0; n < o.views; ++n) {
     View view;
     view.name = std::to_string(n);
     view.camera.width = view.camera.height = o.side;
@@ -89,7 +90,7 @@ WallScene wall_scene(const WallOptions& o) {
     out.scene.input.push_back(n);
     out.scene.views.push_back(view);
   }
-  for (int n = 0; n < 3; ++n) {
+  for (int n = 0; n < o.views; ++n) {
     View& view = out.scene.views[static_cast<size_t>(n)];
     view.image = picture(rasterize(out.splats, view.camera));
     for (int y = 0; y < o.side; ++y) {
@@ -185,6 +186,22 @@ TEST(ThinSplatsOfASmallWall, LooksTheSameToTheReference) {
   for (size_t i = 0; i < all.color.data.size(); ++i) {
     EXPECT_LT((all.color.data[i] - fewer.color.data[i]).cwiseAbs().maxCoeff(), 4 * kStep) << i;
     EXPECT_NEAR(all.alpha.data[i], fewer.alpha.data[i], 4 * kStep) << i;
+  }
+}
+
+// Of fourteen views every other one is fitted to and judged by. The last is none of these, and
+// alone sees the end of the wall.
+TEST(ThinSplatsOfALongWall, KeepsWhatAnyViewShows) {
+  const WallScene w = wall_scene({.noise = 0.05, .views = 14, .side = 32, .step = 0.06});
+  const ThinnedSplats out = thinned(w);
+  ASSERT_TRUE(out.unseen_psnr.has_value());
+  ASSERT_TRUE(out.most_cost.has_value());
+  EXPECT_LT(out.splats.size(), w.splats.size() / 8);
+  for (const size_t n : {size_t{6}, size_t{7}, size_t{13}}) {
+    const std::vector<Camera> camera = {w.scene.views[n].camera};
+    const auto all = pictures_to_match(w.splats, camera);
+    const auto fewer = pictures_to_match(out.splats, camera);
+    EXPECT_LT(mean_square_difference(all[0], fewer[0]), 1e-3) << n;
   }
 }
 
