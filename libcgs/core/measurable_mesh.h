@@ -31,7 +31,8 @@ struct MeasurableMesh {
     return (frame.origin - file_origin) + frame.scale * p;
   }
   bool states_provenance() const { return !mesh.provenance.empty(); }
-  /// Whether any vertex has a sigma: files without one may still have the attribute.
+  /// Whether any vertex has a sigma: files without one may still have the attribute. It looks
+  /// through all of them; of one place its sigma tells, which is NaN there.
   bool states_sigma() const {
     return std::any_of(
         mesh.sigma.begin(), mesh.sigma.end(), [](float s) { return std::isfinite(s); });

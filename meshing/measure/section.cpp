@@ -78,7 +78,7 @@ class Crossings {
     const Eigen::Vector3d p =
         mesh_.points[low] + t * (mesh_.points[high] - mesh_.points[low]) - plane_.point;
     Node out{{p.dot(plane_.right), p.dot(plane_.up)}, std::nan("")};
-    if (mesh_.states_sigma()) {
+    if (!mesh_.mesh.sigma.empty()) {
       out.sigma = (1 - t) * double(mesh_.mesh.sigma[low]) + t * double(mesh_.mesh.sigma[high]);
     }
     return out;

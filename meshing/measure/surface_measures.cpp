@@ -30,7 +30,7 @@ void add_part(MeasuredValue& out, const MeasurableMesh& mesh, size_t face, doubl
 
 // All three corners say how well they are known, and the face was not invented.
 bool is_stated(const MeasurableMesh& mesh, size_t face) {
-  if (!mesh.states_sigma()) return false;
+  if (mesh.mesh.sigma.empty()) return false;
   if (mesh.states_provenance() && !has_evidence(mesh.mesh.provenance[face])) return false;
   for (const uint32_t v : mesh.mesh.faces[face]) {
     if (!std::isfinite(mesh.mesh.sigma[v])) return false;

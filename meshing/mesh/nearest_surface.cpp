@@ -299,7 +299,7 @@ SurfaceEvidence evidence_at(const MeasurableMesh& mesh, const SurfacePoint& poin
   out.sigma = std::numeric_limits<double>::quiet_NaN();
   // Invented surface between observed corners is no better known for their sigma.
   const bool invented = mesh.states_provenance() && !has_evidence(out.provenance);
-  if (mesh.states_sigma() && !invented) {
+  if (!mesh.mesh.sigma.empty() && !invented) {
     out.sigma = 0;
     for (size_t k = 0; k < 3; ++k) {
       const double weight = point.weights[static_cast<Eigen::Index>(k)];
