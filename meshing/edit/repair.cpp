@@ -17,6 +17,7 @@
 #include "meshing/edit/stitching.h"
 #include "meshing/mesh/certificate.h"
 #include "meshing/mesh/components.h"
+#include "meshing/mesh/places.h"
 #include "meshing/mesh/polygon_mesh.h"
 #include "meshing/mesh/self_intersections.h"
 #include "meshing/mesh/vertex_attributes.h"
@@ -29,38 +30,17 @@ using polygon_mesh::PolygonMesh;
 using Face = std::array<uint32_t, 3>;
 namespace pmp = CGAL::Polygon_mesh_processing;
 
-auto place_of(const TriangleMesh& mesh, uint32_t v) {
-  const Eigen::Vector3f& p = mesh.vertices[v];
-  return std::make_tuple(p.x(), p.y(), p.z());
-}
-
-std::vector<uint32_t> sorted_by_place(const TriangleMesh& mesh) {
-  std::vector<uint32_t> order(mesh.vertices.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return std::make_pair(place_of(mesh, a), a) < std::make_pair(place_of(mesh, b), b);
-  });
-  return order;
-}
-
 // Gives vertices at the same place one number, the smallest, and what can be said for all of them.
 size_t merge_vertices(TriangleMesh& mesh) {
-  const std::vector<uint32_t> order = sorted_by_place(mesh);
-  std::vector<uint32_t> renamed(order.size());
+  const std::vector<uint32_t> first = first_at_place(mesh.vertices);
   size_t merged = 0;
-  uint32_t kept = 0;
-  for (size_t i = 0; i < order.size(); ++i) {
-    const uint32_t v = order[i];
-    if (i == 0 || place_of(mesh, v) != place_of(mesh, kept)) {
-      kept = renamed[v] = v;
-      continue;
-    }
+  for (uint32_t v = 0; v < first.size(); ++v) {
+    if (first[v] == v) continue;
     ++merged;
-    renamed[v] = kept;
-    take_weaker_claims(mesh, kept, v);
+    take_weaker_claims(mesh, first[v], v);
   }
   for (Face& face : mesh.faces) {
-    for (uint32_t& v : face) v = renamed[v];
+    for (uint32_t& v : face) v = first[v];
   }
   return merged;
 }
@@ -266,11 +246,9 @@ RepairedMesh repaired(const TriangleMesh& mesh) {
 }
 
 size_t repeated_vertices(const TriangleMesh& mesh) {
-  const std::vector<uint32_t> order = sorted_by_place(mesh);
+  const std::vector<uint32_t> first = first_at_place(mesh.vertices);
   size_t count = 0;
-  for (size_t i = 1; i < order.size(); ++i) {
-    count += place_of(mesh, order[i]) == place_of(mesh, order[i - 1]) ? 1 : 0;
-  }
+  for (uint32_t v = 0; v < first.size(); ++v) count += first[v] == v ? 0 : 1;
   return count;
 }
 

@@ -19,6 +19,7 @@
 #include "libcgs/core/face_adjacency.h"
 #include "meshing/edit/repair.h"
 #include "meshing/mesh/components.h"
+#include "meshing/mesh/places.h"
 #include "meshing/mesh/polygon_mesh.h"
 #include "meshing/mesh/vertex_attributes.h"
 
@@ -205,30 +206,11 @@ void append_split(const std::array<uint32_t, 3>& face,
 
 // --- seams ----------------------------------------------------------------------------------
 
-// Vertices at one place have one number.
-std::vector<uint32_t> numbered_places(const TriangleMesh& mesh) {
-  const auto place = [&](uint32_t v) {
-    const Eigen::Vector3f& p = mesh.vertices[v];
-    return std::make_tuple(p.x(), p.y(), p.z());
-  };
-  std::vector<uint32_t> order(mesh.vertices.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::sort(
-      order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return place(a) < place(b); });
-  std::vector<uint32_t> out(order.size());
-  uint32_t number = 0;
-  for (size_t i = 0; i < order.size(); ++i) {
-    if (i > 0 && place(order[i]) != place(order[i - 1])) ++number;
-    out[order[i]] = number;
-  }
-  return out;
-}
-
 /// Finds which vertices along rims are one.
 class Seams {
  public:
   explicit Seams(const TriangleMesh& mesh)
-      : mesh_(mesh), places_(numbered_places(mesh)), sets_(mesh.vertices.size()) {
+      : mesh_(mesh), places_(first_at_place(mesh.vertices)), sets_(mesh.vertices.size()) {
     mark_flat_faces();
     for (const FaceSide& side : rim_sides(mesh)) add(side);
     std::sort(sides_.begin(), sides_.end(), [](const Side& a, const Side& b) {
@@ -282,7 +264,7 @@ class Seams {
   }
 
   const TriangleMesh& mesh_;
-  std::vector<uint32_t> places_;
+  std::vector<uint32_t> places_;  // per vertex the first one there
   DisjointSets sets_;
   std::vector<uint8_t> is_held_;
   std::vector<Side> sides_;

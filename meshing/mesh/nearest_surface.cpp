@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -15,6 +14,7 @@
 
 #include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
+#include "meshing/mesh/places.h"
 #include "meshing/mesh/triangle_tree.h"
 
 namespace cgs {
@@ -48,23 +48,6 @@ struct Feature {
   uint32_t a = 0;
   uint32_t b = 0;
 };
-
-// Per vertex the first one with the same coordinates: many files give every face its own vertices.
-std::vector<uint32_t> places_of(const std::vector<Eigen::Vector3d>& points) {
-  std::vector<uint32_t> order(points.size());
-  std::iota(order.begin(), order.end(), 0U);
-  tbb::parallel_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    const Eigen::Vector3d& p = points[a];
-    const Eigen::Vector3d& q = points[b];
-    return std::tie(p[0], p[1], p[2], a) < std::tie(q[0], q[1], q[2], b);
-  });
-  std::vector<uint32_t> out(points.size());
-  for (size_t i = 0; i < order.size(); ++i) {
-    const bool is_repeated = i > 0 && points[order[i]] == points[order[i - 1]];
-    out[order[i]] = is_repeated ? out[order[i - 1]] : order[i];
-  }
-  return out;
-}
 
 // Sorted. Faces with two corners in one place have none: those beside them meet.
 std::vector<Edge> edges_of(const MeasurableMesh& mesh, const std::vector<uint32_t>& place) {
@@ -154,7 +137,7 @@ struct NearestSurface::Parts {
 };
 
 void NearestSurface::Parts::add_pseudonormals() {
-  place = places_of(mesh.points);
+  place = first_at_place(mesh.points);
   edges = edges_of(mesh, place);
   vertex_normals.assign(mesh.points.size(), Eigen::Vector3d::Zero());
   for (const uint32_t f : face_of) {
@@ -310,7 +293,7 @@ SurfaceEvidence evidence_at(const MeasurableMesh& mesh, const SurfacePoint& poin
 }
 
 bool has_rim(const MeasurableMesh& mesh) {
-  return !lone_edges(edges_of(mesh, places_of(mesh.points))).empty();
+  return !lone_edges(edges_of(mesh, first_at_place(mesh.points))).empty();
 }
 
 }  // namespace cgs

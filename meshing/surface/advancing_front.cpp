@@ -5,8 +5,6 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <numeric>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -16,6 +14,7 @@
 #include "meshing/mesh/components.h"
 #include "meshing/mesh/measured_value.h"
 #include "meshing/mesh/nudged_point.h"
+#include "meshing/mesh/places.h"
 #include "meshing/mesh/polygon_mesh.h"
 #include "meshing/mesh/vertex_attributes.h"
 
@@ -46,16 +45,11 @@ struct SmallAndShort {
 
 // The first point of every place, in their order.
 std::vector<uint32_t> distinct(const std::vector<Eigen::Vector3f>& points) {
-  std::vector<uint32_t> out(points.size());
-  std::iota(out.begin(), out.end(), 0U);
-  const auto place = [&](uint32_t v) {
-    return std::tuple(points[v].x(), points[v].y(), points[v].z());
-  };
-  std::stable_sort(
-      out.begin(), out.end(), [&](uint32_t a, uint32_t b) { return place(a) < place(b); });
-  const auto same = [&](uint32_t a, uint32_t b) { return place(a) == place(b); };
-  out.erase(std::unique(out.begin(), out.end(), same), out.end());
-  std::sort(out.begin(), out.end());
+  const std::vector<uint32_t> first = first_at_place(points);
+  std::vector<uint32_t> out;
+  for (uint32_t v = 0; v < first.size(); ++v) {
+    if (first[v] == v) out.push_back(v);
+  }
   return out;
 }
 

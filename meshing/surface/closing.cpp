@@ -8,7 +8,6 @@
 #include <numeric>
 #include <optional>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -22,6 +21,7 @@
 #include "meshing/edit/simplify.h"
 #include "meshing/mesh/components.h"
 #include "meshing/mesh/nearest_surface.h"
+#include "meshing/mesh/places.h"
 #include "meshing/mesh/self_intersections.h"
 #include "meshing/mesh/shells.h"
 #include "meshing/mesh/stated_surface.h"
@@ -53,17 +53,10 @@ bool is_flat(double volume, double area) {
 
 // Vertices that lie where others do: sheets touch there without hanging together.
 std::vector<uint8_t> doubled_vertices(const TriangleMesh& mesh) {
-  const auto place = [&](uint32_t v) {
-    const Eigen::Vector3f& p = mesh.vertices[v];
-    return std::make_tuple(p.x(), p.y(), p.z());
-  };
-  std::vector<uint32_t> order(mesh.vertices.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::sort(
-      order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return place(a) < place(b); });
-  std::vector<uint8_t> out(order.size(), 0);
-  for (size_t i = 1; i < order.size(); ++i) {
-    if (place(order[i]) == place(order[i - 1])) out[order[i]] = out[order[i - 1]] = 1;
+  const std::vector<uint32_t> first = first_at_place(mesh.vertices);
+  std::vector<uint8_t> out(first.size(), 0);
+  for (uint32_t v = 0; v < first.size(); ++v) {
+    if (first[v] != v) out[v] = out[first[v]] = 1;
   }
   return out;
 }
