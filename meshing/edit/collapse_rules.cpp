@@ -79,8 +79,7 @@ void Collapser::gather_star(Attempt& attempt) const {
   attempt.dying.clear();
   const auto [u, v] = std::pair(attempt.u, attempt.v);
   for (const uint32_t a : {u, v}) {
-    for (uint32_t i = first_[a]; i < first_[a + 1]; ++i) {
-      const uint32_t f = around_[i];
+    for (const uint32_t f : around_.of(a)) {
       if (is_dead(f)) continue;
       if (!has(mesh_.faces[f], u + v - a)) {
         attempt.moving.push_back(f);
@@ -267,8 +266,7 @@ bool Collapser::folds(const Attempt& attempt) const {
       const float now = f.normal.dot(g.normal);
       if (now < kLeastCosine && now < f.normal_before.dot(g.normal_before)) return true;
     }
-    for (uint32_t i = first_[f.b]; i < first_[f.b + 1]; ++i) {
-      const uint32_t g = around_[i];
+    for (const uint32_t g : around_.of(f.b)) {
       if (g == f.face || !has(mesh_.faces[g], f.c)) continue;
       const Vector3f n = area_vector(mesh_.faces[g]).cast<float>();
       const float now = f.normal.dot(n);
@@ -335,8 +333,8 @@ bool Collapser::is_near_original(const Attempt& attempt, const Vector3f& x) cons
   constexpr float kBetween = 0.75f;   // a face may be farther off between what is looked at
   const float reach = kBetween * limits_.tolerance[nearest];
   if (least <= reach * reach) return true;
-  for (uint32_t i = original_first_[nearest]; i < original_first_[nearest + 1]; ++i) {
-    const Face& face = original_.faces[original_around_[i]];
+  for (const uint32_t f : original_around_.of(nearest)) {
+    const Face& face = original_.faces[f];
     const Triangle triangle(
         original_.vertices[face[0]], original_.vertices[face[1]], original_.vertices[face[2]]);
     if (foot_on(triangle, x - original_.vertices[face[0]]).squared_distance <= reach * reach) {

@@ -11,6 +11,7 @@
 
 #include "meshing/edit/edge_collapse.h"
 #include "meshing/mesh/quadric.h"
+#include "meshing/mesh/vertex_faces.h"
 
 // The inside of collapse_edges(): state in one class, whose functions lie in edge_collapse.cpp
 // (setup and passes), collapse_rules.cpp (what one collapse must keep) and collapse_history.cpp
@@ -102,7 +103,6 @@ class Collapser {
     }
   };
 
-  void index_faces();
   void neighbors_of(uint32_t v, std::vector<EdgeNeighbor>& out) const;
   Kind kind_of(uint32_t v, const std::vector<EdgeNeighbor>& neighbors) const;
   bool one_fan(uint32_t v) const;
@@ -150,9 +150,8 @@ class Collapser {
   Vector3d center_ = Vector3d::Zero();
   bool may_move_anywhere_ = false;  // all tolerances reach across the mesh, colours may change
   std::vector<uint8_t> refused_;    // per face, a bit per side
-  std::vector<uint32_t> first_;     // faces around vertex v: around_[first_[v] ... first_[v + 1])
-  std::vector<uint32_t> around_;    // as of the beginning of the pass
-  std::vector<uint32_t> original_first_, original_around_;  // the same of the input
+  VertexFaces around_;              // as of the beginning of the pass
+  VertexFaces original_around_;     // of the input
   std::vector<Kind> kind_;
   std::vector<Quadric> quadric_;
   std::vector<uint8_t> used_;     // per vertex: merged in this pass
@@ -160,7 +159,6 @@ class Collapser {
   std::vector<float> cost_;       // per slot
   std::vector<Candidate> candidates_;
   CollapseHistory history_;
-  std::vector<uint32_t> cursor_;   // per vertex: where its next face goes in around_
   std::vector<uint32_t> witness_;  // per face: list of original vertices
   std::vector<uint32_t> next_witness_;
   std::vector<uint32_t> next_on_border_;  // per original border vertex: ring of those merged

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include <tbb/blocked_range.h>
@@ -61,45 +62,29 @@ Collapser::Collapser(const TriangleMesh& mesh, const CollapseLimits& limits)
   stamp_.assign(n, 0);
   kind_.assign(n, Kind::Fixed);
   quadric_.resize(n);
-  index_faces();
-  original_first_ = first_;
-  original_around_ = around_;
+  around_ = original_around_ = faces_of_vertices(n, mesh_.faces);
   classify();
   witness_.assign(mesh.faces.size(), kNone);
   next_witness_.assign(n, kNone);
   next_on_border_.resize(n);
   for (uint32_t v = 0; v < n; ++v) {
     next_on_border_[v] = v;
-    if (first_[v] == first_[v + 1]) continue;
+    const std::span<const uint32_t> around = around_.of(v);
+    if (around.empty()) continue;
     // Where labels meet, the surface with evidence is the one to stay near to.
-    const uint32_t f = *std::max_element(
-        around_.begin() + first_[v], around_.begin() + first_[v + 1], [&](uint32_t a, uint32_t b) {
-          return has_evidence(mesh_.provenance[a]) < has_evidence(mesh_.provenance[b]);
-        });
+    const uint32_t f = *std::max_element(around.begin(), around.end(), [&](uint32_t a, uint32_t b) {
+      return has_evidence(mesh_.provenance[a]) < has_evidence(mesh_.provenance[b]);
+    });
     next_witness_[v] = witness_[f];
     witness_[f] = v;
-  }
-}
-
-void Collapser::index_faces() {
-  first_.assign(mesh_.vertices.size() + 1, 0);
-  for (const Face& f : mesh_.faces) {
-    for (const uint32_t v : f) ++first_[v + 1];
-  }
-  for (size_t v = 1; v < first_.size(); ++v) first_[v] += first_[v - 1];
-  around_.resize(3 * mesh_.faces.size());
-  cursor_.assign(first_.begin(), first_.end() - 1);
-  for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
-    for (const uint32_t v : mesh_.faces[f]) around_[cursor_[v]++] = f;
   }
 }
 
 void Collapser::neighbors_of(uint32_t v, std::vector<EdgeNeighbor>& out) const {
   out.clear();
   constexpr uint32_t kMany = 64;  // faces: searching among them costs more than sorting
-  const bool many = first_[v + 1] - first_[v] > kMany;
-  for (uint32_t i = first_[v]; i < first_[v + 1]; ++i) {
-    const uint32_t f = around_[i];
+  const bool many = around_.of(v).size() > kMany;
+  for (const uint32_t f : around_.of(v)) {
     if (is_dead(f)) continue;
     const Face& face = mesh_.faces[f];
     const Provenance label = mesh_.provenance[f];
@@ -121,7 +106,8 @@ void Collapser::neighbors_of(uint32_t v, std::vector<EdgeNeighbor>& out) const {
 
 // Walks from face to face over shared edges; all faces around the vertex must be met.
 bool Collapser::one_fan(uint32_t v) const {
-  std::vector<uint32_t> rest(around_.begin() + first_[v], around_.begin() + first_[v + 1]);
+  const std::span<const uint32_t> around = around_.of(v);
+  std::vector<uint32_t> rest(around.begin(), around.end());
   std::vector<uint32_t> open = {rest.back()};
   rest.pop_back();
   while (!open.empty()) {
@@ -142,7 +128,7 @@ bool Collapser::one_fan(uint32_t v) const {
 Kind Collapser::kind_of(uint32_t v, const std::vector<EdgeNeighbor>& neighbors) const {
   // What is asked of the faces around a vertex takes their square.
   constexpr uint32_t kMostFaces = 1000;
-  const bool is_hub = first_[v + 1] - first_[v] > kMostFaces;
+  const bool is_hub = around_.of(v).size() > kMostFaces;
   if (neighbors.empty() || is_hub || !(limits_.tolerance[v] > 0) || !one_fan(v)) {
     return Kind::Fixed;
   }
@@ -170,8 +156,8 @@ void Collapser::classify() {
 // The planes of the faces around a vertex, weighted by area, and planes that hold its borders.
 Quadric Collapser::quadric_around(uint32_t v, const std::vector<EdgeNeighbor>& neighbors) const {
   Quadric sum;
-  for (uint32_t i = first_[v]; i < first_[v + 1]; ++i) {
-    const Face& face = mesh_.faces[around_[i]];
+  for (const uint32_t f : around_.of(v)) {
+    const Face& face = mesh_.faces[f];
     const Vector3d n = area_vector(face);
     const double length = n.norm();
     if (!(length > 0)) continue;
@@ -323,7 +309,7 @@ bool Collapser::pass(const Progress& progress) {
 
 void Collapser::end_pass() {
   drop_dead_faces();
-  index_faces();
+  around_ = faces_of_vertices(mesh_.vertices.size(), mesh_.faces);
   history_.passes.push_back(history_.collapses.size());
 }
 

@@ -93,18 +93,11 @@ ThicknessGauge::ThicknessGauge(const MeasurableMesh& mesh,
   for (const Eigen::Vector3d& p : mesh.points) box.extend(p);
   // No ball inside is wider than the box: of twice that width, its far side reaches well into it.
   if (!box.isEmpty()) start_ = box.sizes().minCoeff();
-  first_.assign(mesh.points.size() + 1, 0);
   for (const auto& f : mesh.mesh.faces) {
     const Eigen::Vector3d& a = mesh.points[f[0]];
     area_vectors_.emplace_back((mesh.points[f[1]] - a).cross(mesh.points[f[2]] - a));
-    for (const uint32_t v : f) ++first_[v + 1];
   }
-  std::partial_sum(first_.begin(), first_.end(), first_.begin());
-  std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
-  faces_.resize(3 * mesh.mesh.faces.size());
-  for (uint32_t f = 0; f < mesh.mesh.faces.size(); ++f) {
-    for (const uint32_t v : mesh.mesh.faces[f]) faces_[next[v]++] = f;
-  }
+  around_ = faces_of_vertices(mesh.points.size(), mesh.mesh.faces);
 }
 
 Eigen::Vector3d ThicknessGauge::smooth_normal(const SurfacePoint& point) const {
@@ -113,8 +106,8 @@ Eigen::Vector3d ThicknessGauge::smooth_normal(const SurfacePoint& point) const {
   for (size_t k = 0; k < 3; ++k) {
     const uint32_t v = mesh_.mesh.faces[point.face].at(k);
     Eigen::Vector3d around = Eigen::Vector3d::Zero();
-    for (uint32_t i = first_[v]; i < first_[v + 1]; ++i) {
-      const Eigen::Vector3d& other = area_vectors_[faces_[i]];
+    for (const uint32_t f : around_.of(v)) {
+      const Eigen::Vector3d& other = area_vectors_[f];
       if (own.dot(other) > kSmooth * other.norm()) around += other;
     }
     out += point.weights[static_cast<Eigen::Index>(k)] * around.stableNormalized();

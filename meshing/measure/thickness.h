@@ -8,6 +8,7 @@
 #include "libcgs/core/measurable_mesh.h"
 #include "meshing/mesh/measured_value.h"
 #include "meshing/mesh/nearest_surface.h"
+#include "meshing/mesh/vertex_faces.h"
 
 namespace cgs {
 
@@ -55,7 +56,7 @@ class ThicknessGauge {
   double tolerance_;
   double start_ = 0;                           // radius no ball inside reaches [internal units]
   std::vector<Eigen::Vector3d> area_vectors_;  // per face
-  std::vector<uint32_t> first_, faces_;        // of vertex v: faces_[first_[v] ... first_[v + 1])
+  VertexFaces around_;
 };
 
 /// Thickness of places spread evenly over an area.

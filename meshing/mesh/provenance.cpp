@@ -14,6 +14,7 @@
 #include "libcgs/core/nan.h"
 #include "libcgs/core/srgb.h"
 #include "meshing/mesh/halfedges.h"
+#include "meshing/mesh/vertex_faces.h"
 #include "meshing/volume/volume.h"
 
 namespace cgs {
@@ -99,30 +100,6 @@ class VolumeProbe {
   openvdb::Int32Grid::ConstAccessor state_;
 };
 
-// The vertices on the other end of every edge, vertex by vertex.
-struct Neighbours {
-  std::vector<size_t> begin;
-  std::vector<uint32_t> vertex;
-};
-
-Neighbours neighbours(const TriangleMesh& mesh) {
-  Neighbours out;
-  out.begin.assign(mesh.vertices.size() + 1, 0);
-  for (const auto& face : mesh.faces) {
-    for (const uint32_t v : face) out.begin[v + 1] += 2;
-  }
-  for (size_t v = 0; v < mesh.vertices.size(); ++v) out.begin[v + 1] += out.begin[v];
-  out.vertex.resize(out.begin.back());
-  std::vector<size_t> next(out.begin.begin(), out.begin.end() - 1);
-  for (const auto& face : mesh.faces) {
-    for (size_t k = 0; k < 3; ++k) {
-      out.vertex[next[face[k]]++] = face[(k + 1) % 3];
-      out.vertex[next[face[k]]++] = face[(k + 2) % 3];
-    }
-  }
-  return out;
-}
-
 void spread_colors(TriangleMesh& mesh) {
   std::vector<uint32_t> front;
   for (uint32_t v = 0; v < mesh.colors.size(); ++v) {
@@ -132,14 +109,17 @@ void spread_colors(TriangleMesh& mesh) {
     mesh.colors.clear();
     return;
   }
-  const Neighbours around = neighbours(mesh);
+  const VertexFaces around = faces_of_vertices(mesh.vertices.size(), mesh.faces);
   for (size_t i = 0; i < front.size(); ++i) {
     const uint32_t v = front[i];
-    for (size_t k = around.begin[v]; k < around.begin[v + 1]; ++k) {
-      const uint32_t w = around.vertex[k];
-      if (!std::isnan(mesh.colors[w].x())) continue;
-      mesh.colors[w] = mesh.colors[v];
-      front.push_back(w);
+    for (const uint32_t f : around.of(v)) {
+      const auto& face = mesh.faces[f];
+      const size_t at = face[0] == v ? 0 : face[1] == v ? 1 : 2;
+      for (const uint32_t w : {face[(at + 1) % 3], face[(at + 2) % 3]}) {
+        if (!std::isnan(mesh.colors[w].x())) continue;
+        mesh.colors[w] = mesh.colors[v];
+        front.push_back(w);
+      }
     }
   }
   // Parts that no coloured vertex is joined to.
