@@ -2,6 +2,7 @@
 #include "meshing/measure/geodesic.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -16,6 +17,8 @@
 
 #include "libcgs/core/error.h"
 #include "meshing/measure/surface_measures.h"
+#include "meshing/mesh/places.h"
+#include "meshing/mesh/vertex_faces.h"
 
 namespace cgs {
 
@@ -29,21 +32,19 @@ using ShortestPath = CGAL::Surface_mesh_shortest_path<Traits>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Faces around every vertex, one list after the other.
-struct Fans {
-  explicit Fans(const MeasurableMesh& mesh) : first(mesh.points.size() + 1, 0) {
-    for (const auto& face : mesh.mesh.faces) {
-      for (const uint32_t v : face) ++first[v + 1];
+// The faces of a mesh, between the first vertices of their places: they meet along seams, too,
+// where files have every vertex twice.
+struct MeetingFaces {
+  explicit MeetingFaces(const MeasurableMesh& mesh) : points(mesh.points), faces(mesh.mesh.faces) {
+    const std::vector<uint32_t> first = first_at_place(points);
+    for (auto& face : faces) {
+      for (uint32_t& v : face) v = first[v];
     }
-    for (size_t v = 1; v < first.size(); ++v) first[v] += first[v - 1];
-    faces.resize(first.back());
-    std::vector<size_t> next(first.begin(), first.end() - 1);
-    for (uint32_t f = 0; f < mesh.mesh.faces.size(); ++f) {
-      for (const uint32_t v : mesh.mesh.faces[f]) faces[next[v]++] = f;
-    }
+    around = faces_of_vertices(points.size(), faces);
   }
-  std::vector<size_t> first;
-  std::vector<uint32_t> faces;
+  const std::vector<Eigen::Vector3d>& points;
+  std::vector<std::array<uint32_t, 3>> faces;
+  VertexFaces around;
 };
 
 // The shortest way along edges: an upper bound, and where the true one will be near.
@@ -52,8 +53,7 @@ struct EdgeWay {
   std::vector<uint32_t> vertices;
 };
 
-EdgeWay way_along_edges(const MeasurableMesh& mesh,
-                        const Fans& fans,
+EdgeWay way_along_edges(const MeetingFaces& mesh,
                         const SurfacePoint& from,
                         const SurfacePoint& to) {
   std::vector<double> known(mesh.points.size(), kInfinity);
@@ -66,7 +66,7 @@ EdgeWay way_along_edges(const MeasurableMesh& mesh,
     before[v] = by;
     queue.emplace(length, v);
   };
-  for (const uint32_t v : mesh.mesh.faces[from.face]) {
+  for (const uint32_t v : mesh.faces[from.face]) {
     reach(v, (mesh.points[v] - from.position).norm(), ~uint32_t{0});
   }
   EdgeWay out;
@@ -75,13 +75,12 @@ EdgeWay way_along_edges(const MeasurableMesh& mesh,
     const auto [length, v] = queue.top();
     queue.pop();
     if (length > known[v]) continue;
-    for (size_t i = fans.first[v]; i < fans.first[v + 1]; ++i) {
-      const auto& face = mesh.mesh.faces[fans.faces[i]];
-      for (const uint32_t w : face) {
+    for (const uint32_t f : mesh.around.of(v)) {
+      for (const uint32_t w : mesh.faces[f]) {
         if (w != v) reach(w, length + (mesh.points[w] - mesh.points[v]).norm(), v);
       }
       const double whole = length + (to.position - mesh.points[v]).norm();
-      if (fans.faces[i] == to.face && whole < out.length) {
+      if (f == to.face && whole < out.length) {
         out.length = whole;
         last = v;
       }
@@ -92,25 +91,24 @@ EdgeWay way_along_edges(const MeasurableMesh& mesh,
 }
 
 // Faces within a few rings of the way.
-std::vector<uint32_t> faces_around(const MeasurableMesh& mesh,
-                                   const Fans& fans,
+std::vector<uint32_t> faces_around(const MeetingFaces& mesh,
                                    const std::vector<uint32_t>& way,
                                    const std::vector<uint32_t>& ends) {
   constexpr int kRings = 4;
   std::vector<uint8_t> near(mesh.points.size(), 0);
-  std::vector<uint8_t> taken(mesh.mesh.faces.size(), 0);
+  std::vector<uint8_t> taken(mesh.faces.size(), 0);
   std::vector<uint32_t> front = way;
   for (const uint32_t f : ends) {
-    for (const uint32_t v : mesh.mesh.faces[f]) front.push_back(v);
+    for (const uint32_t v : mesh.faces[f]) front.push_back(v);
   }
   for (int ring = 0; ring < kRings; ++ring) {
     std::vector<uint32_t> next;
     for (const uint32_t v : front) {
       if (near[v] != 0) continue;
       near[v] = 1;
-      for (size_t i = fans.first[v]; i < fans.first[v + 1]; ++i) {
-        taken[fans.faces[i]] = 1;
-        for (const uint32_t w : mesh.mesh.faces[fans.faces[i]]) next.push_back(w);
+      for (const uint32_t f : mesh.around.of(v)) {
+        taken[f] = 1;
+        for (const uint32_t w : mesh.faces[f]) next.push_back(w);
       }
     }
     front = std::move(next);
@@ -124,13 +122,13 @@ std::vector<uint32_t> faces_around(const MeasurableMesh& mesh,
 
 // Faces that a way of this length between the two points can touch: the sum of the distances to
 // the ends changes by at most twice the distance walked.
-std::vector<uint32_t> faces_in_ellipsoid(const MeasurableMesh& mesh,
+std::vector<uint32_t> faces_in_ellipsoid(const MeetingFaces& mesh,
                                          const Eigen::Vector3d& a,
                                          const Eigen::Vector3d& b,
                                          double length) {
   std::vector<uint32_t> out;
-  for (uint32_t f = 0; f < mesh.mesh.faces.size(); ++f) {
-    const auto& face = mesh.mesh.faces[f];
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto& face = mesh.faces[f];
     const Eigen::Vector3d middle =
         (mesh.points[face[0]] + mesh.points[face[1]] + mesh.points[face[2]]) / 3;
     double radius = 0;
@@ -147,13 +145,13 @@ struct Part {
   std::vector<uint32_t> face_of;  // face of the whole mesh per face of the part
 };
 
-Part part_of_mesh(const MeasurableMesh& mesh, const std::vector<uint32_t>& faces) {
+Part part_of_mesh(const MeetingFaces& mesh, const std::vector<uint32_t>& faces) {
   Part out;
   std::vector<Kernel::Point_3> points;
   std::vector<std::vector<size_t>> polygons;
   std::vector<uint32_t> number(mesh.points.size(), ~uint32_t{0});
   for (const uint32_t f : faces) {
-    const auto& face = mesh.mesh.faces[f];
+    const auto& face = mesh.faces[f];
     const Eigen::Vector3d u = mesh.points[face[1]] - mesh.points[face[0]];
     const Eigen::Vector3d v = mesh.points[face[2]] - mesh.points[face[0]];
     if (u.cross(v).squaredNorm() == 0) continue;
@@ -177,7 +175,7 @@ enum class End { Source, Target };
 
 // The same point on the part, whose faces may have been turned round and their corners renumbered.
 std::optional<std::pair<Mesh::Face_index, Traits::Barycentric_coordinates>> locate(
-    const Part& part, const MeasurableMesh& mesh, const SurfacePoint& point, End end) {
+    const Part& part, const MeetingFaces& mesh, const SurfacePoint& point, End end) {
   const auto at = std::lower_bound(part.face_of.begin(), part.face_of.end(), point.face);
   if (at == part.face_of.end() || *at != point.face) return std::nullopt;
   const Mesh::Face_index face(static_cast<Mesh::size_type>(at - part.face_of.begin()));
@@ -200,7 +198,7 @@ std::optional<std::pair<Mesh::Face_index, Traits::Barycentric_coordinates>> loca
   for (size_t k = 0; k < 3; ++k) {
     const Kernel::Point_3& p = part.mesh.point(corner.at(k));
     for (size_t j = 0; j < 3; ++j) {
-      const Eigen::Vector3d& q = mesh.points[mesh.mesh.faces[point.face].at(j)];
+      const Eigen::Vector3d& q = mesh.points[mesh.faces[point.face].at(j)];
       if (p.x() == q.x() && p.y() == q.y() && p.z() == q.z()) {
         weights.at(k) = at_corner[static_cast<Eigen::Index>(j)];
       }
@@ -209,7 +207,7 @@ std::optional<std::pair<Mesh::Face_index, Traits::Barycentric_coordinates>> loca
   return std::make_pair(face, weights);
 }
 
-std::vector<Eigen::Vector3d> shortest_path(const MeasurableMesh& mesh,
+std::vector<Eigen::Vector3d> shortest_path(const MeetingFaces& mesh,
                                            const std::vector<uint32_t>& faces,
                                            const SurfacePoint& from,
                                            const SurfacePoint& to) {
@@ -280,21 +278,21 @@ SurfacePath distance_along(const MeasurableMesh& mesh,
     out.length = measure(mesh, out.points);
     return out;
   }
-  const Fans fans(mesh);
-  const EdgeWay edges = way_along_edges(mesh, fans, from, to);
+  const MeetingFaces surface(mesh);
+  const EdgeWay edges = way_along_edges(surface, from, to);
   if (!std::isfinite(edges.length)) {
     throw InvalidInput(
         "no way along the surface leads from one point to the other: they lie on parts that "
         "do not hang together");
   }
-  const auto band = faces_around(mesh, fans, edges.vertices, {from.face, to.face});
-  out.points = shortest_path(mesh, band, from, to);
+  const auto band = faces_around(surface, edges.vertices, {from.face, to.face});
+  out.points = shortest_path(surface, band, from, to);
   const double bound = std::min(edges.length, length_of(out.points));
-  const auto reachable = faces_in_ellipsoid(mesh, from.position, to.position, bound);
+  const auto reachable = faces_in_ellipsoid(surface, from.position, to.position, bound);
   constexpr size_t kMostFaces = 200'000;  // a minute or two
   out.exact = reachable.size() <= kMostFaces;
   if (out.exact) {
-    auto best = shortest_path(mesh, reachable, from, to);
+    auto best = shortest_path(surface, reachable, from, to);
     if (length_of(best) <= length_of(out.points)) out.points = std::move(best);
   }
   if (out.points.size() < 2) {  // as where three faces meet in an edge

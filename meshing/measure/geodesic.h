@@ -20,8 +20,8 @@ struct SurfacePath {
 /// The shortest way along the surface between two points of it, through the inside of faces.
 ///
 /// Exact on the whole surface: every shortest way lies within the ellipsoid that a way along edges
-/// bounds, so that only its faces take part. Where more than two faces share an edge the surface
-/// counts as cut there.
+/// bounds, so that only its faces take part. Faces meet where their corners are in the same places;
+/// where more than two share an edge the surface counts as cut there.
 /// Source: Xin and Wang 2009, "Improving Chen and Han's algorithm on the discrete geodesic
 /// problem", as in CGAL.
 /// \throws InvalidInput if no way leads from one to the other

@@ -39,6 +39,21 @@ TEST(DistanceAlong, GoesRoundASphereAndATube) {
   EXPECT_NEAR(helix.length.value, std::hypot(24 * side, 0.4), 1e-9);
 }
 
+// As a texture leaves it: no face beside the seam names a vertex of the other side.
+TEST(DistanceAlong, CrossesASeamWhoseVerticesAreDoubled) {
+  const double turn = 2 * std::numbers::pi;
+  const MeasurableMesh tube = test::grid_mesh(96, 24, [&](double s, double t) {
+    const double angle = s == 1 ? 0 : turn * s;
+    return Eigen::Vector3d(0.2 * std::cos(angle), 0.2 * std::sin(angle), 0.6 * t);
+  });
+  const double side = 2 * 0.2 * std::sin(std::numbers::pi / 96);
+  const double x = 0.2 * std::cos(turn * 10 / 96);
+  const double y = 0.2 * std::sin(turn * 10 / 96);
+  const SurfacePath path = between(tube, {x, y, 0.3}, {x, -y, 0.4});
+  EXPECT_TRUE(path.exact);
+  EXPECT_NEAR(path.length.value, std::hypot(20 * side, 0.1), 1e-9);
+}
+
 TEST(DistanceAlong, IsTheSameFromEitherEndOnEdgesToo) {
   const MeasurableMesh cube = test::cube_mesh();
   const auto both_ways = [](const MeasurableMesh& mesh, const auto& a, const auto& b) {
