@@ -2,8 +2,12 @@
 #include "meshing/measure/surface_measures.h"
 
 #include <cmath>
+#include <map>
 
 #include <Eigen/Geometry>
+
+#include "libcgs/core/disjoint_sets.h"
+#include "meshing/mesh/places.h"
 
 namespace cgs {
 
@@ -74,27 +78,45 @@ std::vector<Eigen::Vector3d> area_gradients(const MeasurableMesh& mesh) {
   return out;
 }
 
-// Across its normal, what is known of a point to sigma is known to this share of it.
-constexpr double kTangential = 0.65;
-
-// Of the area, from points that are off along the surface: what its extent is off by, all areas are
-// twice. That is most of the error of flat surface, whose area does not change along its normals.
-double sigma_from_extent(const MeasurableMesh& mesh) {
+// A part of the surface that hangs together, as far as it states a sigma.
+struct StatedPart {
   Eigen::AlignedBox3d box;
   double area = 0;
   double squares = 0;  // of sigma, by area
+
+  // What the part's extent is off by, its area is twice.
+  double sigma_of_area() const {
+    if (!(area > 0)) return 0;
+    const double end = kTangential * std::sqrt(squares / area);
+    return 2 * area * std::sqrt(2.0) * end / box.diagonal().norm();
+  }
+};
+
+// Of the area, from points that are off along the surface. That is most of the error of flat
+// surface, whose area does not change along its normals. Parts apart know nothing of each other's
+// extent; faces hang together where their corners are in the same places.
+double sigma_from_extent(const MeasurableMesh& mesh) {
+  const std::vector<uint32_t> first = first_at_place(mesh.points);
+  DisjointSets sets(first.size());
+  for (const auto& [a, b, c] : mesh.mesh.faces) {
+    sets.join(first[a], first[b]);
+    sets.join(first[b], first[c]);
+  }
+  std::map<uint32_t, StatedPart> parts;
   for (size_t f = 0; f < mesh.mesh.faces.size(); ++f) {
     if (!is_stated(mesh, f)) continue;
-    const double part = corners(mesh, f).area_vector().norm();
-    area += part;
-    for (const uint32_t v : mesh.mesh.faces[f]) {
-      box.extend(mesh.points[v]);
-      squares += part / 3 * std::pow(double(mesh.mesh.sigma[v]), 2);
+    const auto& face = mesh.mesh.faces[f];
+    StatedPart& part = parts[sets.root(first[face[0]])];
+    const double area = corners(mesh, f).area_vector().norm();
+    part.area += area;
+    for (const uint32_t v : face) {
+      part.box.extend(mesh.points[v]);
+      part.squares += area / 3 * std::pow(double(mesh.mesh.sigma[v]), 2);
     }
   }
-  if (!(area > 0)) return 0;
-  const double end = kTangential * std::sqrt(squares / area);
-  return 2 * area * std::sqrt(2.0) * end / box.diagonal().norm();
+  double sigma = 0;
+  for (const auto& [root, part] : parts) sigma = std::hypot(sigma, part.sigma_of_area());
+  return sigma;
 }
 
 }  // namespace

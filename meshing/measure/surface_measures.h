@@ -28,6 +28,10 @@ class SigmaSum {
   double squares_ = 0;
 };
 
+/// Along the surface, a point that is known to sigma across it is known to this share of it, see
+/// straight_distance().
+inline constexpr double kTangential = 0.65;
+
 /// Area of all faces.
 MeasuredValue surface_area(const MeasurableMesh& mesh);
 
@@ -46,11 +50,11 @@ Eigen::Vector3d volume_centroid(const MeasurableMesh& mesh);
 
 /// Straight distance between two points of the surface, whose errors are independent.
 ///
-/// Each end is uncertain by its sigma along the normal, and by 0.65 of it in any direction along
-/// the surface: an error in depth moves what a photograph shows along its ray, and tan^2 of the
-/// angle between ray and normal has the mean 2 * 0.65^2 over surfaces that are turned away by up to
-/// 60 degrees, weighed by how large they appear. The whole figure belongs to the weaker provenance
-/// of its ends.
+/// Each end is uncertain by its sigma along the normal, and by kTangential of it in any direction
+/// along the surface: an error in depth moves what a photograph shows along its ray, and tan^2 of
+/// the angle between ray and normal has the mean 2 * 0.65^2 over surfaces that are turned away by
+/// up to 60 degrees, weighed by how large they appear. The whole figure belongs to the weaker
+/// provenance of its ends.
 MeasuredValue straight_distance(const MeasurableMesh& mesh,
                                 const SurfacePoint& from,
                                 const SurfacePoint& to);

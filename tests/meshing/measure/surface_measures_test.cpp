@@ -101,6 +101,25 @@ TEST(SurfaceMeasures, SigmaOfFlatAreaIsThatOfItsSides) {
   EXPECT_NEAR(area.sigma / area.value, 2 * diagonal.sigma / diagonal.value, 1e-6);
 }
 
+// Of plates apart, each is known by its own extent, however far from the other it lies.
+TEST(SurfaceMeasures, SigmaOfPlatesApartIsThatOfEach) {
+  const auto plates = [](double apart, uint32_t second) {
+    MeasurableMesh out;
+    out.points = {{0, 0, 0}, {0.1, 0, 0}, {0.1, 0.1, 0}, {0, 0, 0}, {0.1, 0.1, 0}, {0, 0.1, 0}};
+    out.mesh.faces = {{0, 1, 2}, {3, 4, 5}};  // by place they hang together
+    for (uint32_t v = 0; v < second; ++v)
+      out.points.push_back(out.points[v] + apart * Eigen::Vector3d::UnitX());
+    if (second > 0) out.mesh.faces.push_back({6, 7, 8});
+    if (second > 0) out.mesh.faces.push_back({9, 10, 11});
+    return test::with_sigma(test::with_vertices(std::move(out)), 1e-3f);
+  };
+  const MeasuredValue one = surface_area(plates(0, 0));
+  const MeasuredValue two = surface_area(plates(10, 6));
+  EXPECT_NEAR(one.sigma / one.value, 2 * 0.65 * 1e-3 * std::sqrt(2) / std::hypot(0.1, 0.1), 1e-6);
+  EXPECT_NEAR(two.value, 2 * one.value, 1e-12);
+  EXPECT_NEAR(two.sigma / one.sigma, std::sqrt(2), 1e-9);
+}
+
 TEST(SurfaceMeasures, InventedSurfaceStatesNoSigma) {
   const MeasurableMesh sphere = test::with_sigma(test::sphere_mesh(0.4), 1e-4f);
   const double whole = enclosed_volume(sphere).sigma;
