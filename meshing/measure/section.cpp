@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -210,6 +211,7 @@ struct Cut {
 struct Uncertainty {
   double stated_length = 0;
   SigmaSum lengths;
+  double ends = 0;  // of open lines: sum of the squares of what they are off by along the surface
   SigmaSum areas;
 };
 
@@ -237,6 +239,10 @@ std::vector<FaceCut> face_cuts(const Crossings& crossings, const Chain& chain) {
   return out;
 }
 
+bool is_invented(const MeasurableMesh& mesh, uint32_t face) {
+  return mesh.states_provenance() && !has_evidence(mesh.mesh.provenance[face]);
+}
+
 // Adds a line's share to sigma of length and area, and to the stated length. Where all surface
 // moves outwards, an outline grows and a hole in it shrinks: the area gains by both.
 void add_uncertainty(const Cut& cut, const Chain& chain, bool bounds_area, Uncertainty& sum) {
@@ -245,8 +251,7 @@ void add_uncertainty(const Cut& cut, const Chain& chain, bool bounds_area, Uncer
   for (size_t i = 0; i < cuts.size(); ++i) {
     const auto& [face, sigma_across, along] = cuts[i];
     const double sigma = sigma_across * shift_in_plane(mesh, plane, face);
-    const bool invented = mesh.states_provenance() && !has_evidence(mesh.mesh.provenance[face]);
-    if (!std::isfinite(sigma) || invented) continue;
+    if (!std::isfinite(sigma) || is_invented(mesh, face)) continue;
     sum.stated_length += along.norm();
     if (bounds_area) sum.areas.add(sigma * along.norm());
     if (i + 1 == cuts.size() && !chain.closed) continue;
@@ -255,6 +260,12 @@ void add_uncertainty(const Cut& cut, const Chain& chain, bool bounds_area, Uncer
     const Eigen::Vector2d middle = (before + after).stableNormalized();
     const Eigen::Vector2d outwards(middle.y(), -middle.x());
     sum.lengths.add(sigma * (before - after).dot(outwards));
+  }
+  if (chain.closed) return;
+  for (const auto& [node, face] : {std::pair(chain.nodes.front(), chain.faces.front()),
+                                   std::pair(chain.nodes.back(), chain.faces.back())}) {
+    const double sigma = kTangential * crossings.nodes[node].sigma;
+    if (std::isfinite(sigma) && !is_invented(mesh, face)) sum.ends += sigma * sigma;
   }
 }
 
@@ -309,7 +320,7 @@ Section section(const MeasurableMesh& mesh, const CutPlane& plane) {
   out.length.stated = sum.stated_length / (out.length.value > 0 ? out.length.value : 1);
   out.area.stated = out.length.stated;
   if (out.length.stated > 0) {
-    out.length.sigma = sum.lengths.sigma();
+    out.length.sigma = std::hypot(sum.lengths.sigma(), std::sqrt(sum.ends));
     out.area.sigma = sum.areas.sigma();
   }
   if (out.open_lines > 0) out.area.value = out.area.sigma = std::nan("");

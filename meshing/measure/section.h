@@ -25,7 +25,7 @@ CutPlane cut_plane(const Eigen::Vector3d& point, const Eigen::Vector3d& normal);
 /// Where a plane meets a mesh.
 struct Section {
   std::vector<DrawnLine> lines;  ///< [internal units] in the axes of the plane.
-  MeasuredValue length;          ///< Of all lines.
+  MeasuredValue length;          ///< Of all lines; sigma is that of their bends and open ends.
   MeasuredValue area;  ///< Within the lines, where an inner line is a hole; NaN where lines are
                        ///< open, as nobody knows what these enclose. Parts not stated.
   size_t open_lines = 0;

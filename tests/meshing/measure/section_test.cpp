@@ -152,6 +152,23 @@ TEST(Section, SigmaOfAHollowIsThatOfBothItsSides) {
   EXPECT_NEAR(cut.area.sigma / (larger.area.value - cut.area.value), 1, 0.03);
 }
 
+// A straight line is not longer where its surface moves across it, but its ends are known only so
+// well: as the distance between them.
+TEST(Section, SigmaOfAnOpenStraightLineIsThatOfItsEnds) {
+  const auto wall =
+      test::grid_mesh(6, 4, [](double s, double t) { return Eigen::Vector3d(3 * s, 0, 2 * t); });
+  MeasurableMesh known = test::with_sigma(wall, 5e-3f);
+  const CutPlane plane = cut_plane({0, 0, 1.2}, {0, 0, 1});
+  const Section cut = section(known, plane);
+  EXPECT_EQ(cut.open_lines, 1U);
+  EXPECT_NEAR(cut.length.value, 3, 1e-12);
+  EXPECT_NEAR(cut.length.sigma, 0.65 * 5e-3 * std::sqrt(2), 1e-8);
+  for (size_t v = 0; v < known.points.size(); ++v) {
+    if (known.points[v].x() > 2) known.mesh.sigma[v] = NAN;
+  }
+  EXPECT_NEAR(section(known, plane).length.sigma, 0.65 * 5e-3, 1e-8) << "the other states none";
+}
+
 TEST(Section, SigmaIsTheSameThroughVerticesAsBesideThem) {
   const auto mesh = test::with_sigma(test::sphere_mesh(0.4, 32, 64), 1e-3f);
   const double equator = mesh.points[1 + 15 * 64].z();
