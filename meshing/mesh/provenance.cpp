@@ -32,6 +32,12 @@ struct CellMean {
   }
 };
 
+// The part of a voxel in a cell: 1 at its own corner, 0 at the three faces away from it.
+float share_of(const Eigen::Vector3i& corner, const Eigen::Vector3f& t) {
+  return (corner.x() != 0 ? t.x() : 1 - t.x()) * (corner.y() != 0 ? t.y() : 1 - t.y()) *
+         (corner.z() != 0 ? t.z() : 1 - t.z());
+}
+
 class VolumeProbe {
  public:
   explicit VolumeProbe(const Volume& volume)
@@ -52,6 +58,7 @@ class VolumeProbe {
     const Eigen::Vector3f floor = index.array().floor();
     const Eigen::Vector3f t = index - floor;
     CellMean<float> distance{0};
+    CellMean<float> off{0};  // the same, of nothing but where the vertex is
     CellMean<float> sigma{0};
     CellMean<Eigen::Vector3f> color{Eigen::Vector3f::Zero()};
     float nearest = std::numeric_limits<float>::max();
@@ -65,10 +72,10 @@ class VolumeProbe {
           int(floor.x()) + d.x(), int(floor.y()) + d.y(), int(floor.z()) + d.z());
       float value = 0;
       if (!tsdf_.probeValue(at, value)) continue;
-      // A little weight everywhere keeps the mean defined on the faces of the cell.
-      const float w = 1e-3f + (d.x() != 0 ? t.x() : 1 - t.x()) * (d.y() != 0 ? t.y() : 1 - t.y()) *
-                                  (d.z() != 0 ? t.z() : 1 - t.z());
+      const float share = share_of(d, t);
+      const float w = 1e-3f + share;  // keeps means defined on the faces of the cell
       distance.add(value, w);
+      off.add(value, share);
       ++(value < 0 ? inside : outside);
       if (std::abs(value) < nearest) {
         nearest = std::abs(value);
@@ -84,7 +91,10 @@ class VolumeProbe {
         inside > 0 && outside > 0 && std::abs(distance.sum) <= voxel_ * distance.weight;
     mesh.support[v] = crossing ? support : 0;
     const bool is_known = crossing && !is_estimated && sigma.weight > 0;
-    mesh.sigma[v] = is_known ? sigma.sum / sigma.weight : kNaN;
+    // A level set that was smoothed may have its zero elsewhere: as much is not known better.
+    const CellMean<float>& from_zero = off.weight > 0 ? off : distance;
+    mesh.sigma[v] =
+        is_known ? std::hypot(sigma.sum / sigma.weight, from_zero.sum / from_zero.weight) : kNaN;
     mesh.colors[v].setConstant(kNaN);
     if (crossing && color.weight > 0) {
       mesh.colors[v] = (color.sum / color.weight).unaryExpr(&srgb_from_linear);

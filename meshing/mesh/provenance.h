@@ -34,7 +34,8 @@ struct VertexEvidence {
 ///
 /// A vertex counts as observed if the observed ones of its eight voxels have both signs, and the
 /// distance interpolated from them is below one voxel. Support is that of the voxel nearest to the
-/// surface; colour and sigma are interpolated over the voxels that have one. Where that voxel is
+/// surface; colour and sigma are interpolated over the voxels that have one, and what the vertex is
+/// off the zero of the interpolated distance is added to sigma in squares. Where that voxel is
 /// estimated, so is the vertex: its support is 0, its sigma NaN. Vertices without evidence take the
 /// colour of the nearest vertex that has one, counted in edges.
 VertexEvidence annotate_vertices(TriangleMesh& mesh, const Volume& volume);

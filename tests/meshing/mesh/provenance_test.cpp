@@ -79,6 +79,17 @@ TEST(AnnotateVertices, EstimatedVoxelsGiveColourButNeitherSupportNorSigma) {
   for (const float sigma : mesh.sigma) EXPECT_TRUE(std::isnan(sigma) || sigma > 0.99f * kSigma);
 }
 
+TEST(AnnotateVertices, SigmaGrowsByHowFarAVertexLiesOffTheMeasuredSurface) {
+  TriangleMesh mesh = plane();
+  const uint32_t moved = vertex_at(5, 7);
+  constexpr float kOff = 0.4f * kVoxel;
+  mesh.vertices[moved].z() += kOff;
+  annotate_vertices(mesh, planted([](int, int) { return VoxelState::Occupied; }));
+  for (uint32_t v = 0; v < mesh.vertices.size(); ++v) {
+    EXPECT_NEAR(mesh.sigma[v], v == moved ? std::hypot(kSigma, kOff) : kSigma, 1e-6f) << v;
+  }
+}
+
 TEST(LabelFaces, OneEstimatedCornerMakesAFaceEstimated) {
   TriangleMesh mesh = plane();
   const Volume volume = planted(
