@@ -50,17 +50,20 @@ void for_each_pixel(const std::array<Eigen::Matrix<Scalar, 3, 1>, 3>& corner,
                     Scalar slack = 0) {
   constexpr Scalar kHalf(0.5);
   const auto& [a, b, c] = corner;
-  const auto first = [](Scalar low, int begin) {
-    return std::max(begin, static_cast<int>(std::ceil(low - kHalf)));
+  const auto within = [](Scalar value, int low, int high) {  // corners may lie beyond all integers
+    return static_cast<int>(std::clamp(value, static_cast<Scalar>(low), static_cast<Scalar>(high)));
   };
-  const auto last = [](Scalar high, int end) {
-    return std::min(end - 1, static_cast<int>(std::floor(high - kHalf)));
+  const auto first = [&](Scalar low, int begin, int end) {
+    return within(std::ceil(low - kHalf), begin, end);
   };
-  const int y0 = first(std::min({a.y(), b.y(), c.y()}), rect.y0);
-  const int y1 = last(std::max({a.y(), b.y(), c.y()}), rect.y1);
+  const auto last = [&](Scalar high, int begin, int end) {
+    return within(std::floor(high - kHalf), begin - 1, end - 1);
+  };
+  const int y0 = first(std::min({a.y(), b.y(), c.y()}), rect.y0, rect.y1);
+  const int y1 = last(std::max({a.y(), b.y(), c.y()}), rect.y0, rect.y1);
   if (y0 > y1) return;
-  const int x0 = first(std::min({a.x(), b.x(), c.x()}), rect.x0);
-  const int x1 = last(std::max({a.x(), b.x(), c.x()}), rect.x1);
+  const int x0 = first(std::min({a.x(), b.x(), c.x()}), rect.x0, rect.x1);
+  const int x1 = last(std::max({a.x(), b.x(), c.x()}), rect.x0, rect.x1);
   const Scalar area = edge_function<Scalar>(a, b, c.x(), c.y());
   if (!(std::abs(area) > 0)) return;
   for (int y = y0; y <= y1; ++y) {
@@ -86,5 +89,10 @@ void for_each_pixel(const ProjectedFace& face, const PixelRect& rect, const Visi
 /// 1 / z of the nearest surface at every pixel centre, 0 = nothing. Same bits for any number of
 /// threads.
 Raster<float> nearness_map(const std::vector<ProjectedFace>& faces, int width, int height);
+/// The same with what lies before the camera of faces that reach behind it: it hides others, too.
+/// \param faces  projected_faces() of the two
+Raster<float> nearness_map(const TriangleMesh& mesh,
+                           const Camera& camera,
+                           const std::vector<ProjectedFace>& faces);
 
 }  // namespace cgs

@@ -29,7 +29,7 @@ class ViewScorer {
         view_(view),
         eye_(view.camera.center()),
         faces_(projected_faces(mesh, view.camera)),
-        nearest_(nearness_map(faces_, view.camera.width, view.camera.height)),
+        nearest_(nearness_map(mesh, view.camera, faces_)),
         // A footprint at depth z is z / f, which in 1 / z is the share 1 / f.
         footprint_(1 / static_cast<float>(std::min(view.camera.fx, view.camera.fy))) {}
 

@@ -38,6 +38,41 @@ TEST(ProjectedFaces, TellWhatLiesBehindTheCamera) {
   for (size_t f = 0; f < faces.size(); ++f) EXPECT_EQ(faces[f].in_front, f / 2 == 5) << f;
 }
 
+// 1 / z where the ray of a pixel meets a triangle before a camera at the origin, else 0.
+double nearness_by_ray(const TriangleMesh& mesh, const Eigen::Vector3d& ray) {
+  const Eigen::Vector3d a = mesh.vertices[0].cast<double>();
+  Eigen::Matrix3d sides;
+  sides << mesh.vertices[1].cast<double>() - a, mesh.vertices[2].cast<double>() - a, -ray;
+  const Eigen::Vector3d at = sides.inverse() * -a;
+  const bool meets = at.x() >= 0 && at.y() >= 0 && at.x() + at.y() <= 1 && at.z() > 0;
+  return meets ? 1 / at.z() : 0;
+}
+
+TEST(NearnessMap, HoldsWhatLiesBeforeTheCameraOfAFaceThatReachesBehindIt) {
+  const Camera camera = test::camera_at({0, 0, 0}, {0, 0, 1});
+  TriangleMesh one_behind;  // the camera's axes are those of the world: y is down
+  one_behind.vertices = {{-20, 0.5f, 20}, {20, 0.5f, 20}, {0, 0.5f, -5}};
+  TriangleMesh two_behind;
+  two_behind.vertices = {{-2, 0.5f, -5}, {2, 0.5f, -5}, {0.3f, 0.5f, 20}};
+  for (TriangleMesh* mesh : {&one_behind, &two_behind}) {
+    mesh->faces = {{0, 1, 2}};
+    const Raster<float> map = nearness_map(*mesh, camera, projected_faces(*mesh, camera));
+    int differ = 0;
+    int hit = 0;
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const double expected = nearness_by_ray(*mesh, camera.ray_in_cam(x + 0.5, y + 0.5));
+        if ((expected > 0) != (map(x, y) > 0)) ++differ;  // outlines through a pixel centre
+        if (!(expected > 0) || !(map(x, y) > 0)) continue;
+        ++hit;
+        EXPECT_NEAR(double(map(x, y)) / expected, 1, 1e-5);
+      }
+    }
+    EXPECT_GT(hit, 5000);
+    EXPECT_LE(differ, 2);
+  }
+}
+
 TEST(ForEachPixel, WeighsTheCorners) {
   const ProjectedFace face{{Eigen::Vector3f(0, 0, 1), {8, 0, 2}, {0, 8, 3}}, true};
   int pixels = 0;

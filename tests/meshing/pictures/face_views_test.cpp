@@ -98,6 +98,17 @@ TEST(FaceScores, NeverShowAFaceBehindAnother) {
   EXPECT_EQ(clear_and_shown, clear);
 }
 
+TEST(FaceScores, NeverShowAFaceBehindOneThatReachesBehindTheCamera) {
+  TriangleMesh mesh;
+  mesh.vertices = {{-0.1f, -0.1f, 2}, {0, 0.1f, 2}, {0.1f, -0.1f, 2}};
+  mesh.faces = {{0, 1, 2}};
+  const std::vector<View> views = {view_at({0, 0, 0}, {0, 0, 1})};
+  EXPECT_GT(face_scores(mesh, views)(0, 0), 0);
+  mesh.vertices.insert(mesh.vertices.end(), {{-3, -3, -2}, {-3, 3, -2}, {3, 0, 4}});
+  mesh.faces.push_back({3, 4, 5});  // 1 before the camera, and 2 behind it
+  EXPECT_EQ(face_scores(mesh, views)(0, 0), 0);
+}
+
 TEST(FaceScores, LargeFacesAreNotShownWhereOnlyTheirMiddleIsHidden) {
   TriangleMesh mesh = test::box(1);  // sides of two triangles
   const TriangleMesh occluder = test::box(4);
