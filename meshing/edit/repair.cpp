@@ -14,6 +14,7 @@
 #include <CGAL/Polygon_mesh_processing/repair_degeneracies.h>
 #include <Eigen/Geometry>
 
+#include "libcgs/core/error.h"
 #include "meshing/edit/stitching.h"
 #include "meshing/mesh/certificate.h"
 #include "meshing/mesh/components.h"
@@ -203,9 +204,20 @@ void remove_flat_faces(RepairedMesh& out) {
   out.flat_faces += flat - std::min(flat, out.flat_left);
 }
 
+// What can be proved; of more self-intersections than are held, that there are more.
+Certificate certificate_of(const TriangleMesh& mesh) {
+  try {
+    return certify(mesh);
+  } catch (const LimitError&) {
+    Certificate out;
+    out.self_intersections = kMostSelfIntersections + 1;
+    return out;
+  }
+}
+
 // Only a closed surface that does not cut itself has an outside.
 void orient_outward(RepairedMesh& out) {
-  const Certificate found = certify(out.mesh);
+  const Certificate found = certificate_of(out.mesh);
   out.self_intersections = found.self_intersections;
   if (!found.closed || found.self_intersections > 0 || found.oriented_outward) return;
   PolygonMesh halfedges = polygon_mesh::from_triangles(out.mesh, "repair");

@@ -19,7 +19,8 @@ struct RepairedMesh {
   size_t turned_faces = 0;     ///< Whose corners now run the other way.
   size_t split_vertices = 0;   ///< Added where more than two faces met at an edge, or only corners
                                ///< of two sheets.
-  size_t self_intersections = 0;  ///< Pairs of faces; these are left as they are.
+  size_t self_intersections = 0;  ///< Pairs of faces; these are left as they are. One more than
+                                  ///< kMostSelfIntersections if there are more.
 };
 
 /// Makes a mesh out of any set of triangles.

@@ -187,9 +187,8 @@ class PairTests {
     }
     waiting_.clear();
     progress_.tell();
-    constexpr size_t kMost = 20'000'000;
-    if ((count_ += found_.size() - before) <= kMost) return;
-    throw LimitError("more than " + std::to_string(kMost) +
+    if ((count_ += found_.size() - before) <= kMostSelfIntersections) return;
+    throw LimitError("more than " + std::to_string(kMostSelfIntersections) +
                      " pairs of faces cut each other or lie on each other");
   }
 

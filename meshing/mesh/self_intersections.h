@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -10,12 +11,14 @@
 
 namespace cgs {
 
+inline constexpr size_t kMostSelfIntersections = 20'000'000;  ///< Pairs that are held.
+
 /// Pairs of faces (smaller index first, ascending) that touch beyond the vertices and edges they
 /// share by index. Decided with exact predicates, so there is no tolerance; works on any soup.
 /// A face of zero area counts as intersecting itself.
 /// \param progress  again after every hundred thousand pairs of boxes or so, of which nobody knows
 ///                  how many there are
-/// \throws LimitError above 20 million pairs, as of a hundred thousand equal faces
+/// \throws LimitError above kMostSelfIntersections, as of a hundred thousand equal faces
 std::vector<std::pair<uint32_t, uint32_t>> self_intersections(const TriangleMesh& mesh,
                                                               const Progress& progress = {});
 

@@ -114,11 +114,16 @@ TriangleMesh without_small_open_parts(const TriangleMesh& mesh, Small which) {
   return with_faces(mesh, keep);
 }
 
-TriangleMesh put_right(const TriangleMesh& mesh, Small dropped) {
-  TriangleMesh out = without_small_open_parts(repaired(mesh).mesh, dropped);
+// \param mesh  repaired
+TriangleMesh with_sheets_apart(const TriangleMesh& mesh, Small dropped) {
+  TriangleMesh out = without_small_open_parts(mesh, dropped);
   if (out.faces.empty()) throw NumericalError("no face with an area is left");
   pull_apart(out);
   return out;
+}
+
+TriangleMesh put_right(const TriangleMesh& mesh, Small dropped) {
+  return with_sheets_apart(repaired(mesh).mesh, dropped);
 }
 
 TriangleMesh filled(const TriangleMesh& mesh) {
@@ -211,8 +216,10 @@ class Closing {
   explicit Closing(const TriangleMesh& input) : input_(input), diagonal_(diagonal_of(input)) {}
 
   bool repair() {
-    return attempt(
-        "repair", 0, [&] { return held_against_ = base_ = put_right(input_, Small::Sheets); });
+    return attempt("repair", 0, [&] {
+      held_against_ = base_ = repaired(input_).mesh;  // for the other ways, whatever fails here
+      return held_against_ = base_ = with_sheets_apart(base_, Small::Sheets);
+    });
   }
 
   bool fill() {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "meshing/mesh/certificate.h"
+#include "meshing/mesh/self_intersections.h"
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
@@ -145,6 +146,22 @@ TEST(Repaired, CountsEveryFaceWithoutArea) {
   EXPECT_EQ(out.flat_left, left);
   EXPECT_EQ(left, 4U);
   EXPECT_EQ(out.flat_faces, 1U);
+}
+
+// Two bundles of sheets, each of which cuts all of the other one.
+TEST(Repaired, GivesAMeshThatCutsItselfMoreOftenThanCanBeHeld) {
+  constexpr uint32_t kSheets = 4600;
+  TriangleMesh mesh;
+  for (uint32_t i = 0; i < kSheets; ++i) {
+    const float at = 0.001f * static_cast<float>(i + 1);
+    mesh.vertices.insert(mesh.vertices.end(), {{at, -10, -10}, {at, 10, -10}, {at, 0, 20}});
+    mesh.vertices.insert(mesh.vertices.end(), {{-10, at, -9}, {10, at, -9}, {0, at, 21}});
+    mesh.faces.push_back({6 * i, 6 * i + 1, 6 * i + 2});
+    mesh.faces.push_back({6 * i + 3, 6 * i + 4, 6 * i + 5});
+  }
+  const RepairedMesh out = repaired(mesh);
+  EXPECT_EQ(out.self_intersections, kMostSelfIntersections + 1);
+  EXPECT_EQ(out.mesh.faces.size(), size_t{2} * kSheets);
 }
 
 TEST(WithoutSelfIntersections, DropsTheFacesThatCut) {
