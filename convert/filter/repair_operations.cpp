@@ -16,6 +16,7 @@ namespace {
 std::string repair_remark(const RepairedMesh& result) {
   const std::pair<size_t, const char*> findings[] = {
       {result.merged_vertices, " vertices merged"},
+      {result.other_colors, " of them of another colour, which is LOST"},
       {result.unused_vertices, " unused vertices dropped"},
       {result.flat_faces, " faces without area removed"},
       {result.flat_left, " faces without area LEFT"},

@@ -32,18 +32,18 @@ using Face = std::array<uint32_t, 3>;
 namespace pmp = CGAL::Polygon_mesh_processing;
 
 // Gives vertices at the same place one number, the smallest, and what can be said for all of them.
-size_t merge_vertices(TriangleMesh& mesh) {
+void merge_vertices(RepairedMesh& out) {
+  TriangleMesh& mesh = out.mesh;
   const std::vector<uint32_t> first = first_at_place(mesh.vertices);
-  size_t merged = 0;
   for (uint32_t v = 0; v < first.size(); ++v) {
     if (first[v] == v) continue;
-    ++merged;
+    ++out.merged_vertices;
+    if (are_of_other_colors(mesh, first[v], v)) ++out.other_colors;
     take_weaker_claims(mesh, first[v], v);
   }
   for (Face& face : mesh.faces) {
     for (uint32_t& v : face) v = first[v];
   }
-  return merged;
 }
 
 void drop_faces(TriangleMesh& mesh, const std::vector<uint8_t>& keep) {
@@ -240,7 +240,7 @@ RepairedMesh repaired(const TriangleMesh& mesh) {
   CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
   RepairedMesh out;
   out.mesh = mesh;
-  out.merged_vertices = merge_vertices(out.mesh);
+  merge_vertices(out);
   drop_improper_faces(out);
   if (auto stitched = without_t_junctions(out.mesh)) {
     out.split_edges = stitched->vertices;

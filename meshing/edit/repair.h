@@ -11,6 +11,7 @@ namespace cgs {
 struct RepairedMesh {
   TriangleMesh mesh;
   size_t merged_vertices = 0;  ///< That lay exactly where another one does.
+  size_t other_colors = 0;     ///< Of these, whose colour was another one, and is lost.
   size_t unused_vertices = 0;  ///< That no face names, or none any more.
   size_t flat_faces = 0;       ///< Without area, collapsed or flipped away.
   size_t flat_left = 0;        ///< Without area, that could be neither collapsed nor flipped.

@@ -250,10 +250,7 @@ class Seams {
   }
 
   bool may_join(uint32_t a, uint32_t b) const {
-    constexpr float kOtherColor = 0.1f;  // more than a texture differs from itself at its seams
-    if (is_held_[a] != 0 || is_held_[b] != 0) return false;
-    return mesh_.colors.empty() ||
-           (mesh_.colors[a] - mesh_.colors[b]).cwiseAbs().maxCoeff() <= kOtherColor;
+    return is_held_[a] == 0 && is_held_[b] == 0 && !are_of_other_colors(mesh_, a, b);
   }
 
   void join(const Side& a, const Side& b) {

@@ -74,6 +74,12 @@ void take_weaker_claims(TriangleMesh& mesh, uint32_t kept, uint32_t other) {
   if (!std::isnan(mesh.sigma[kept])) mesh.sigma[kept] = mesh.sigma[other];  // NaN takes over
 }
 
+bool are_of_other_colors(const TriangleMesh& mesh, uint32_t a, uint32_t b) {
+  constexpr float kOther = 0.1f;
+  return !mesh.colors.empty() &&
+         !((mesh.colors[a] - mesh.colors[b]).cwiseAbs().maxCoeff() <= kOther);
+}
+
 TriangleMesh with_vertices(const TriangleMesh& mesh, const std::vector<uint8_t>& keep) {
   assert(keep.size() == mesh.vertices.size());
   if (!mesh.faces.empty()) {

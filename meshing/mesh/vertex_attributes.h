@@ -29,6 +29,10 @@ void append_blend(TriangleMesh& to, const TriangleMesh& from, std::span<const Ve
 /// largest sigma, NaN as soon as one states none. All else stays.
 void take_weaker_claims(TriangleMesh& mesh, uint32_t kept, uint32_t other);
 
+/// Whether the colours of two vertices differ by more than a texture does from itself at its seams,
+/// 0.1 of a channel; false without colours.
+bool are_of_other_colors(const TriangleMesh& mesh, uint32_t a, uint32_t b);
+
 /// Of a mesh the faces all of whose corners are kept, and the vertices these use; of a point cloud
 /// the points that are kept. All attributes stay.
 /// \pre keep holds 0 or 1 for every vertex

@@ -78,6 +78,20 @@ TEST(Repaired, MergedVerticesClaimTheLeast) {
   EXPECT_EQ(out.support[1], 1);
 }
 
+TEST(Repaired, CountsColoursThatMergedVerticesLose) {
+  TriangleMesh soup;
+  soup.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 0}, {0, -1, 0}};
+  soup.faces = {{0, 1, 2}, {3, 4, 5}};
+  EXPECT_EQ(repaired(soup).other_colors, 0U);
+  soup.colors.assign(6, Eigen::Vector3f::Constant(0.5f));
+  soup.colors[3].x() = 0.55f;  // as a texture differs from itself
+  soup.colors[4].z() = 0.7f;
+  const RepairedMesh out = repaired(soup);
+  EXPECT_EQ(out.merged_vertices, 2U);
+  EXPECT_EQ(out.other_colors, 1U);
+  EXPECT_EQ(out.mesh.colors[0], soup.colors[0]);
+}
+
 TEST(Repaired, TurnsAClosedSolidOutwards) {
   TriangleMesh cube = test::cube_mesh(1).mesh;
   for (auto& face : cube.faces) std::swap(face[0], face[1]);
