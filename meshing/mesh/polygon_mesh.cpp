@@ -22,8 +22,9 @@ PolygonMesh from_triangles(const TriangleMesh& mesh, const char* user) {
       continue;
     }
     throw NumericalError(std::string(user) + ": face " + std::to_string(f) +
-                         " does not fit to its neighbours (an edge of more than two faces, or "
-                         "faces that disagree on what is outside); repair the mesh first");
+                         " does not fit to its neighbours (an edge of more than two faces, faces "
+                         "that disagree on what is outside, or sheets that meet in a single "
+                         "vertex); repair the mesh first");
   }
   return out;
 }

@@ -23,7 +23,8 @@ inline Eigen::Vector3f vector_of(const Point& p) {
 
 /// The mesh with halfedges; vertices and faces keep their numbers.
 /// \throws NumericalError that starts with `user` where more than two faces meet at an edge, faces
-///         disagree on what is outside, or a face names a vertex twice
+///         disagree on what is outside, sheets meet in a single vertex that the faces of one go all
+///         around, or a face names a vertex twice
 PolygonMesh from_triangles(const TriangleMesh& mesh, const char* user);
 
 /// The vertices and faces that were not removed, in their order.

@@ -2,6 +2,7 @@
 #include "meshing/edit/remeshing.h"
 
 #include <cmath>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -72,6 +73,23 @@ TEST(Remeshed, RefusesWhatMightNotEnd) {
   EXPECT_THROW(remeshed(crossed, 0.1), NumericalError);
   EXPECT_THROW(remeshed(test::cube_mesh(1).mesh, 1e-6), LimitError);
   EXPECT_THROW(remeshed(test::cube_mesh(1).mesh, 0), InvalidInput);
+}
+
+TEST(Remeshed, NamesSheetsThatMeetInAVertexAsACauseOfTheRefusal) {
+  TriangleMesh mesh;  // two tetrahedra
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+  for (const uint32_t k : {0U, 3U}) {
+    mesh.faces.push_back({0, k + 2, k + 1});
+    mesh.faces.push_back({0, k + 1, k + 3});
+    mesh.faces.push_back({0, k + 3, k + 2});
+    mesh.faces.push_back({k + 1, k + 2, k + 3});
+  }
+  try {
+    remeshed(mesh, 0.5);
+    ADD_FAILURE() << "two fans around one vertex";
+  } catch (const NumericalError& error) {
+    EXPECT_NE(std::string(error.what()).find("single vertex"), std::string::npos) << error.what();
+  }
 }
 
 TEST(Remeshed, CutsOffNoCorner) {
