@@ -162,6 +162,9 @@ class ModelShelf {
 }  // namespace
 
 FusedVolume fuse_model(const Model& model, const ModelFusion& request, const Progress& progress) {
+  size_t pixels = 0;
+  for (const ViewPriors& priors : model.priors) pixels += priors.depth.data.size();
+  check_view_memory(pixels, request.memory_limit);
   std::vector<TsdfView> views;
   for (size_t k = 0; k < model.scene.input.size(); ++k) {
     views.push_back(seen_by_input(model, k, request.estimated, true));

@@ -31,16 +31,20 @@ constexpr size_t kEvidenceBytes =
     BlockEvidence::kBandBytes + BlockEvidence::kSigmaBytes + BlockEvidence::kColorBytes;
 constexpr size_t kHeldPixelBytes = DepthField::kPixelBytes + sizeof(Eigen::Vector3f) + 1;
 constexpr size_t kBlockBytes = 16;  // Of any block, in lists.
+constexpr size_t kPixelBytes = 80;  // A prepared depth map, with its bounds and normals.
+
+std::string mebibytes(size_t bytes) {
+  constexpr size_t kMebi = size_t{1} << 20;
+  return std::to_string((bytes + kMebi - 1) / kMebi) + " MiB";
+}
 
 void check_memory(TsdfReport& report, size_t predicted, size_t limit) {
   report.predicted_bytes = predicted;
   if (predicted <= limit) return;
-  constexpr size_t kMebi = size_t{1} << 20;
   throw WithRemedy<LimitError>(
       Remedy::LargerVoxels,
-      "fusing " + std::to_string(report.voxels) + " voxels may take " +
-          std::to_string((predicted + kMebi - 1) / kMebi) + " MiB, allowed are " +
-          std::to_string(limit / kMebi) +
+      "fusing " + std::to_string(report.voxels) + " voxels may take " + mebibytes(predicted) +
+          ", allowed are " + std::to_string(limit >> 20) +
           " MiB; larger voxels need less, a larger memory limit allows it");
 }
 
@@ -174,6 +178,8 @@ class Fuser {
   }
 
   void fuse_at_once() {
+    const size_t before_looking = pixels_ * kPixelBytes + grid_.size() * kBlockBytes;
+    check_memory(out_.report, before_looking, options_.memory_limit);
     Fields none;
     const auto held = witnesses(views_, {0, views_.size()}, options_, rules_.voxel, none);
     const std::vector<const DepthField*> fields = fields_of(held);
@@ -183,13 +189,11 @@ class Fuser {
       grid_.each_in_cube(c, [&](size_t i, size_t n) { sights[i] = look.together(n); });
     });
     const auto mixed = size_t(std::count(sights.begin(), sights.end(), Sight::Mixed));
-    constexpr size_t kPixelBytes = 80;   // A prepared depth map, with its bounds and normals.
     constexpr size_t kMostThreads = 16;  // whose cubes hold evidence: foreseen alike everywhere
     const size_t held_blocks =
         std::min(mixed, std::min(kMostThreads, grid_.cube_count()) * BlockGrid::kBlocksPerCube);
     check_memory(out_.report,
-                 pixels_ * kPixelBytes + grid_.size() * kBlockBytes + mixed * kLeafBytes +
-                     held_blocks * kEvidenceBytes,
+                 before_looking + mixed * kLeafBytes + held_blocks * kEvidenceBytes,
                  options_.memory_limit);
     evidence_.resize(grid_.size());
     collect(0.15, [&](size_t c, const auto& keep) {
@@ -402,11 +406,21 @@ void TsdfOptions::validate() const {
           gap_pixels);
 }
 
+void check_view_memory(size_t pixels, size_t limit) {
+  if (pixels * kPixelBytes <= limit) return;
+  throw LimitError("fusing depth maps of " + std::to_string(pixels) + " pixels may take " +
+                   mebibytes(pixels * kPixelBytes) + ", allowed are " +
+                   std::to_string(limit >> 20) + " MiB; a larger memory limit allows it");
+}
+
 FusedVolume fuse(std::span<const TsdfView> views,
                  const TsdfOptions& options,
                  const Progress& progress) {
   options.validate();
   for (size_t i = 0; i < views.size(); ++i) validate_view(views[i], i);
+  size_t pixels = 0;
+  for (const TsdfView& view : views) pixels += view.depth.data.size();
+  check_view_memory(pixels, options.memory_limit);
   return Fuser(FusionViews(views), options, progress).run(0);
 }
 

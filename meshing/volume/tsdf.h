@@ -48,6 +48,10 @@ FusedVolume fuse(std::span<const TsdfView> views,
                  const TsdfOptions& options,
                  const Progress& progress = {});
 
+/// Asks whether fuse() may take depth maps of so many pixels in all, before they are made.
+/// \throws LimitError if they alone need more than the limit [bytes], whatever the voxels
+void check_view_memory(size_t pixels, size_t limit);
+
 inline constexpr size_t kViewMemory = size_t{256} << 20;
 inline constexpr size_t kFootprints = size_t{1} << 22;
 FusedVolume fuse_streamed(const TsdfSource& source,

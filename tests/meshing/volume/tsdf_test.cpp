@@ -469,6 +469,14 @@ TEST(Fuse, RefusesWhatDoesNotFitIntoMemory) {
   EXPECT_THROW(fuse(views, {.voxel_size = 1e-7}), LimitError);
 }
 
+TEST(Fuse, RefusesViewsThatDoNotFitIntoMemoryBeforeItLooksAtThem) {
+  bool has_begun = false;
+  const auto views = three_views(sphere_before_wall());
+  const Progress begin = [&](double) { has_begun = true; };
+  EXPECT_THROW(fuse(views, {.memory_limit = 1000000}, begin), LimitError);
+  EXPECT_FALSE(has_begun);
+}
+
 TEST(Fuse, RefusesViewsItCannotUse) {
   EXPECT_THROW(fuse({}, {}), InvalidInput);
   auto views = three_views(sphere_before_wall());
