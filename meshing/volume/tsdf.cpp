@@ -395,6 +395,11 @@ void TsdfOptions::validate() const {
           "TsdfOptions.truncation must be >= 2 voxels and finite",
           truncation);
   require(max_voxels >= 4096, "TsdfOptions.max_voxels must be >= 4096", max_voxels);
+  // However large the voxels are, the bounds hold the band around the surface.
+  const double across_band = 2 * (double(truncation) + kFusionMargin);
+  require(voxel_size > 0 || double(max_voxels) > std::pow(across_band, 3),
+          "TsdfOptions.max_voxels must be > (2 truncation + 4)^3",
+          max_voxels);
   require(coarsest_voxel >= 0, "TsdfOptions.coarsest_voxel must be >= 0", coarsest_voxel);
   require(min_weight >= 0, "TsdfOptions.min_weight must be >= 0", min_weight);
   require(common_sigma >= 0 && common_sigma <= 1,

@@ -12,7 +12,8 @@ struct TsdfOptions {
                           ///< the surface, coarsened until the bounds hold max_voxels.
   float truncation = 4;   ///< Half-width of the band around the surface [voxels]; >= 2. A pixel
                           ///< uses the larger of this and 3 sigma, at most 3 times this.
-  int64_t max_voxels = 40'000'000;  ///< Voxels in the bounds when voxel_size is chosen; >= 4096.
+  int64_t max_voxels = 40'000'000;  ///< Voxels in the bounds when voxel_size is chosen; >= 4096
+                                    ///< and then > (2 truncation + 4)^3, the band's at any size.
   double coarsest_voxel = 0;  ///< When voxel_size is chosen, max_voxels makes it no coarser than
                               ///< this or, where that is larger, the median pixel footprint or
                               ///< sigma [internal units]; 0 = any.

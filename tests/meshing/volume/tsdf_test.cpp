@@ -505,6 +505,9 @@ TEST(TsdfOptions, RefusesEveryFieldOutOfRange) {
   EXPECT_THROW(TsdfOptions{.voxel_size = nan}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.truncation = 1.9f}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.max_voxels = 0}.validate(), InvalidInput);
+  EXPECT_THROW((TsdfOptions{.truncation = 8, .max_voxels = 4096}.validate()), InvalidInput);
+  EXPECT_THROW(TsdfOptions{.truncation = 170}.validate(), InvalidInput);
+  EXPECT_NO_THROW((TsdfOptions{.voxel_size = 1, .truncation = 170}.validate()));
   EXPECT_THROW(TsdfOptions{.coarsest_voxel = nan}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.min_weight = -1}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.common_sigma = 1.5}.validate(), InvalidInput);
