@@ -2,6 +2,7 @@
 #include "meshing/edit/simplify.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -113,6 +114,52 @@ void hold_borders(const TriangleMesh& mesh, double most_change, std::vector<floa
   });
 }
 
+// The places of the corners of two faces, whatever their numbers and order.
+using PairPlaces = std::array<std::array<std::array<float, 3>, 3>, 2>;
+
+PairPlaces places_of(const TriangleMesh& mesh, const std::pair<uint32_t, uint32_t>& pair) {
+  PairPlaces out;
+  for (size_t i = 0; i < 2; ++i) {
+    const auto& face = mesh.faces[i == 0 ? pair.first : pair.second];
+    for (size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3f& p = mesh.vertices[face.at(k)];
+      out.at(i).at(k) = {p.x(), p.y(), p.z()};
+    }
+    std::sort(out.at(i).begin(), out.at(i).end());
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Finds what cuts itself in a result. Two faces that did so in the input and are still where they
+// were are none of it: no round would part them.
+class NewIntersections {
+ public:
+  explicit NewIntersections(const TriangleMesh& input) : input_(input) {}
+
+  std::vector<uint32_t> faces_of(const TriangleMesh& result) {
+    const auto pairs = self_intersections(result);
+    std::vector<uint32_t> out;
+    if (pairs.empty()) return out;
+    if (!given_) find_given();
+    for (const auto& pair : pairs) {
+      if (std::binary_search(given_->begin(), given_->end(), places_of(result, pair))) continue;
+      out.insert(out.end(), {pair.first, pair.second});
+    }
+    return out;
+  }
+
+ private:
+  void find_given() {
+    given_.emplace();
+    for (const auto& pair : self_intersections(input_)) given_->push_back(places_of(input_, pair));
+    std::sort(given_->begin(), given_->end());
+  }
+
+  const TriangleMesh& input_;
+  std::optional<std::vector<PairPlaces>> given_;  // ascending; known once it is asked for
+};
+
 // Holds input vertices nearer to the result than in the last round.
 class Tightening {
  public:
@@ -197,6 +244,7 @@ SimplifyResult simplify_connected(const TriangleMesh& mesh,
       tolerances(mesh, options), float(options.max_color_error), options.target_faces, 0};
   hold_borders(mesh, options.max_area_change, limits.tolerance);
   CollapseHistory history;
+  NewIntersections intersections(mesh);
   constexpr int kRounds = 10;
   for (int round = 1; round <= kRounds; ++round) {
     const auto part = [&](double begin, double end) {
@@ -208,8 +256,7 @@ SimplifyResult simplify_connected(const TriangleMesh& mesh,
     result.area_after = area_by_provenance(out.mesh);
     if (tighten_for_area(mesh, result, options.max_area_change, limits.tolerance)) continue;
     Tightening tightening(limits.tolerance, options.max_error / 32);
-    std::vector<uint32_t> bad;
-    for (const auto& [f, g] : self_intersections(out.mesh)) bad.insert(bad.end(), {f, g});
+    std::vector<uint32_t> bad = intersections.faces_of(out.mesh);
     const Measured forth = measure(out.mesh, mesh, options, part(0.7, 0.8));
     const Measured back = measure(mesh, out.mesh, options, part(0.8, 1));
     bad.insert(bad.end(), forth.too_far.begin(), forth.too_far.end());
@@ -224,7 +271,7 @@ SimplifyResult simplify_connected(const TriangleMesh& mesh,
       report(progress, 1);
       return result;
     }
-    tightening.apply();
+    if (tightening.apply() == 0) break;  // the next round would be the same
   }
   const int rounds = result.rounds;
   result = unchanged(mesh);

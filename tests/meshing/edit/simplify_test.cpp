@@ -420,6 +420,31 @@ TEST(Simplify, DoesNotLetTwoNearSheetsIntersectForANumberOfFaces) {
   EXPECT_GT(result.rounds, 1);
 }
 
+// What the input has cannot be mended here, and is no reason to leave the rest as it is.
+TEST(Simplify, KeepsWhereTheInputCutsItselfAndSimplifiesTheRest) {
+  const TriangleMesh ring = torus(32);
+  const auto with_face = [&](const Vector3f& a, const Vector3f& b, const Vector3f& c) {
+    TriangleMesh out = ring;
+    const auto n = static_cast<uint32_t>(out.vertices.size());
+    out.vertices.insert(out.vertices.end(), {a, b, c});
+    out.faces.push_back({n, n + 1, n + 2});
+    return out;
+  };
+  const TriangleMesh pierced =
+      with_face({0.39f, 0.008f, 0.003f}, {0.41f, 0.009f, 0.003f}, {0.41f, 0.012f, 0.005f});
+  const float within = 0.3997f;  // a little below the surface
+  const TriangleMesh with_flat_face =
+      with_face({within, 0.002f, 0}, {within, 0.003f, 0}, {within, 0.004f, 0});
+  for (const TriangleMesh& mesh : {pierced, with_flat_face}) {
+    const size_t given = certify(mesh).self_intersections;
+    ASSERT_GT(given, 0U);
+    const SimplifyResult result = simplify(mesh, {.max_error = 2e-3});
+    EXPECT_LT(result.faces_after, result.faces_before / 2);
+    EXPECT_LT(result.rounds, 10);
+    EXPECT_LE(certify(result.mesh).self_intersections, given);
+  }
+}
+
 TEST(Simplify, LeavesANonManifoldEdgeAlone) {
   TriangleMesh mesh = grid(8, 8, false, false, [](float u, float v) { return Vector3f(u, v, 0); });
   const auto n = static_cast<uint32_t>(mesh.vertices.size());
