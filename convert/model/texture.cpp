@@ -27,14 +27,6 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-double face_area(const TriangleMesh& mesh, size_t f) {
-  const auto& face = mesh.faces[f];
-  const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
-  return 0.5 * (mesh.vertices[face[1]].cast<double>() - a)
-                   .cross(mesh.vertices[face[2]].cast<double>() - a)
-                   .norm();
-}
-
 // Texture coordinates are interpolated linearly over a face, photographs are perspective: the
 // largest distance between the two at the middles of edges [pixels].
 double largest_stretch(const TriangleMesh& mesh, const PhotoTexture& texture) {
@@ -64,10 +56,10 @@ void count_faces(const TriangleMesh& mesh,
     if (i >= 0) {
       TextureReport::Shown& view = out.views[static_cast<size_t>(i)];
       ++view.faces;
-      view.area += face_area(mesh, f) * area_unit;
+      view.area += face_area(mesh, mesh.faces[f]) * area_unit;
     } else if (mesh.provenance.empty() || was_seen(mesh.provenance[f])) {
       ++out.faces_without_view;
-      out.area_without_view += face_area(mesh, f) * area_unit;
+      out.area_without_view += face_area(mesh, mesh.faces[f]) * area_unit;
     }
   }
 }

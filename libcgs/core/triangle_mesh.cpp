@@ -12,6 +12,10 @@ Eigen::Vector3d area_vector(const TriangleMesh& mesh, const std::array<uint32_t,
   return (b - a).cross(c - a);
 }
 
+double face_area(const TriangleMesh& mesh, const std::array<uint32_t, 3>& face) {
+  return 0.5 * area_vector(mesh, face).norm();
+}
+
 std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3d> sums(mesh.vertices.size(), Eigen::Vector3d::Zero());
   for (const auto& face : mesh.faces) {
@@ -31,7 +35,7 @@ std::array<double, kProvenanceCount> area_by_provenance(const TriangleMesh& mesh
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     const auto label =
         static_cast<size_t>(mesh.provenance.empty() ? Provenance::Inferred : mesh.provenance[f]);
-    area.at(label) += 0.5 * area_vector(mesh, mesh.faces[f]).norm();
+    area.at(label) += face_area(mesh, mesh.faces[f]);
   }
   return area;
 }

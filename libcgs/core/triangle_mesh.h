@@ -27,6 +27,9 @@ struct TriangleMesh {
 /// Twice the area of a face times its unit normal; in double, because thin faces far out cancel.
 Eigen::Vector3d area_vector(const TriangleMesh& mesh, const std::array<uint32_t, 3>& face);
 
+/// The area of a face [internal units squared].
+double face_area(const TriangleMesh& mesh, const std::array<uint32_t, 3>& face);
+
 /// Area-weighted vertex normals from the faces; 0 where a vertex has no face of positive area.
 std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh);
 

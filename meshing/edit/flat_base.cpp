@@ -76,12 +76,9 @@ Eigen::Vector3d seen_side(const TriangleMesh& mesh) {
   double area = 0;
   for (size_t f = 0; f < mesh.provenance.size(); ++f) {
     if (!was_seen(mesh.provenance[f])) continue;
-    const auto& face = mesh.faces[f];
-    const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
-    const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>() - a;
-    const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>() - a;
-    sum += b.cross(c);
-    area += b.cross(c).norm();
+    const Eigen::Vector3d of_face = area_vector(mesh, mesh.faces[f]);
+    sum += of_face;
+    area += of_face.norm();
   }
   constexpr double kAlike = 0.05;
   return sum.norm() > kAlike * area ? sum : Eigen::Vector3d::Zero();

@@ -117,10 +117,7 @@ double append_faces(TriangleMesh& out, const PlacedMesh& closed, const std::vect
       for (const auto v : closed.fv_range(f)) face.at(k++) = static_cast<uint32_t>(v.idx());
       out.faces.push_back(face);
       if (!out.provenance.empty()) out.provenance.push_back(Provenance::Inferred);
-      const Eigen::Vector3d a = out.vertices[face[0]].cast<double>();
-      area += 0.5 * (out.vertices[face[1]].cast<double>() - a)
-                        .cross(out.vertices[face[2]].cast<double>() - a)
-                        .norm();
+      area += face_area(out, face);
     }
   }
   return area;

@@ -86,13 +86,6 @@ struct CopyRecorder : pmp::Default_orientation_visitor {
   void duplicated_vertex(std::size_t from, std::size_t to) { copies->emplace_back(from, to); }
 };
 
-double area_of(const TriangleMesh& mesh, const Face& f) {
-  const Eigen::Vector3d a = mesh.vertices[f[0]].cast<double>();
-  return 0.5 * (mesh.vertices[f[1]].cast<double>() - a)
-                   .cross(mesh.vertices[f[2]].cast<double>() - a)
-                   .norm();
-}
-
 void turn(Face& face) { std::swap(face[1], face[2]); }
 
 // Splits what is not manifold and makes neighbours agree; parts then run as most of their area did.
@@ -133,7 +126,7 @@ void orient_faces(RepairedMesh& out) {
   const MeshComponents parts = components(mesh);
   std::vector<double> balance(parts.area.size(), 0);
   for (size_t f = 0; f < turned.size(); ++f) {
-    balance[parts.of_face[f]] += (turned[f] != 0 ? -1 : 1) * area_of(mesh, mesh.faces[f]);
+    balance[parts.of_face[f]] += (turned[f] != 0 ? -1 : 1) * face_area(mesh, mesh.faces[f]);
   }
   for (size_t f = 0; f < turned.size(); ++f) {
     const bool back = balance[parts.of_face[f]] < 0;

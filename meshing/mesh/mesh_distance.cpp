@@ -121,24 +121,12 @@ Triangles triangles(const TriangleMesh& mesh) {
   return out;
 }
 
-double face_area(const TriangleMesh& mesh, size_t f) {
-  const auto& face = mesh.faces[f];
-  const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
-  const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>();
-  const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>();
-  const Eigen::Vector3d u = b - a;
-  const Eigen::Vector3d v = c - a;
-  return 0.5 * std::sqrt((u.y() * v.z() - u.z() * v.y()) * (u.y() * v.z() - u.z() * v.y()) +
-                         (u.z() * v.x() - u.x() * v.z()) * (u.z() * v.x() - u.x() * v.z()) +
-                         (u.x() * v.y() - u.y() * v.x()) * (u.x() * v.y() - u.y() * v.x()));
-}
-
 }  // namespace
 
 SurfaceSamples sample_faces(const TriangleMesh& mesh, size_t count) {
   std::vector<double> up_to(mesh.faces.size());
   double sum = 0;
-  for (size_t f = 0; f < up_to.size(); ++f) up_to[f] = sum += face_area(mesh, f);
+  for (size_t f = 0; f < up_to.size(); ++f) up_to[f] = sum += face_area(mesh, mesh.faces[f]);
   SurfaceSamples samples;
   if (!(sum > 0)) return samples;
   samples.points.reserve(count);

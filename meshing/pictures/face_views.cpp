@@ -123,7 +123,7 @@ class Labelling {
     best_.resize(n);
     std::vector<float> densities;
     for (size_t f = 0; f < n; ++f) {
-      area_[f] = static_cast<float>(0.5 * area_vector(mesh, mesh.faces[f]).norm());
+      area_[f] = static_cast<float>(face_area(mesh, mesh.faces[f]));
       for (size_t k = 0; k < 3; ++k) {
         const Eigen::Vector3f& p = mesh.vertices[mesh.faces[f].at(k)];
         length_[f].at(k) = (mesh.vertices[mesh.faces[f].at((k + 1) % 3)] - p).norm();

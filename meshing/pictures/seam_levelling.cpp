@@ -90,7 +90,7 @@ class Membrane {
                 double reach) {
     std::array<Eigen::Vector3d, 3> p;
     for (size_t k = 0; k < 3; ++k) p.at(k) = mesh.vertices[mesh.faces[f].at(k)].cast<double>();
-    const double area = 0.5 * area_vector(mesh, mesh.faces[f]).norm();
+    const double area = face_area(mesh, mesh.faces[f]);
     for (size_t k = 0; k < 3; ++k) {
       const Eigen::Vector3d a = p.at((k + 1) % 3) - p.at(k);
       const Eigen::Vector3d b = p.at((k + 2) % 3) - p.at(k);

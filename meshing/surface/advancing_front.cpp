@@ -136,9 +136,7 @@ void turn_parts(TriangleMesh& mesh) {
   std::vector<PartSide> all(parts.area.size());
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     const auto& [a, b, c] = mesh.faces[f];
-    const Eigen::Vector3d area = (mesh.vertices[b] - mesh.vertices[a])
-                                     .cast<double>()
-                                     .cross((mesh.vertices[c] - mesh.vertices[a]).cast<double>());
+    const Eigen::Vector3d area = area_vector(mesh, mesh.faces[f]);
     const Eigen::Vector3d out = sides[a] + sides[b] + sides[c];
     PartSide& part = all[parts.of_face[f]];
     part.agreement += area.dot(out);

@@ -97,10 +97,7 @@ std::vector<double> cut_off(const TriangleMesh& wrap,
   std::vector<double> out(wrap.faces.size());
   tbb::parallel_for(size_t(0), out.size(), [&](size_t f) {
     const auto& [a, b, c] = wrap.faces[f];
-    const Eigen::Vector3d normal = (wrap.vertices[b] - wrap.vertices[a])
-                                       .cast<double>()
-                                       .cross((wrap.vertices[c] - wrap.vertices[a]).cast<double>())
-                                       .stableNormalized();
+    const Eigen::Vector3d normal = area_vector(wrap, wrap.faces[f]).stableNormalized();
     const Eigen::Vector3d middle = (corners[a] + corners[b] + corners[c]) / 3;
     const StatedPlace place = source.nearest(middle);
     const bool at_back = source.knows_sides() && place.normal.dot(normal) < 0;

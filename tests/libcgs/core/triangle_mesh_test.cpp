@@ -23,6 +23,13 @@ TEST(VertexNormals, AreZeroWithoutAFace) {
   EXPECT_EQ(vertex_normals(unit_square())[4], Eigen::Vector3f::Zero());
 }
 
+TEST(FaceArea, IsHalfTheLengthOfTheAreaVector) {
+  const TriangleMesh mesh = unit_square();
+  EXPECT_EQ(area_vector(mesh, mesh.faces[0]), Eigen::Vector3d(0, 0, 1));
+  EXPECT_EQ(face_area(mesh, mesh.faces[0]), 0.5);
+  EXPECT_EQ(face_area(mesh, {0, 1, 1}), 0);
+}
+
 TEST(AreaByProvenance, SplitsTheArea) {
   const auto area = area_by_provenance(unit_square());
   EXPECT_DOUBLE_EQ(area[size_t(Provenance::Observed)], 0.5);
