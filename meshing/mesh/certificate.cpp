@@ -166,6 +166,16 @@ bool is_closed_manifold(const TriangleMesh& mesh) {
   return edge_facts(edges).closed && vertex_manifold(mesh, edges);
 }
 
+void set_areas(Certificate& certificate, const TriangleMesh& mesh) {
+  const auto areas = area_by_provenance(mesh);
+  certificate.observed_area = areas[size_t(Provenance::Observed)];
+  certificate.single_view_area = areas[size_t(Provenance::SingleView)];
+  certificate.interpolated_area = areas[size_t(Provenance::Interpolated)];
+  certificate.estimated_area = areas[size_t(Provenance::Estimated)];
+  certificate.inferred_area = areas[size_t(Provenance::Inferred)];
+  certificate.virtual_area = areas[size_t(Provenance::Virtual)];
+}
+
 Certificate certify(const TriangleMesh& mesh, const Progress& progress) {
   Certificate out;
   const std::vector<HalfEdge> edges = sorted_half_edges(mesh);
@@ -187,13 +197,7 @@ Certificate certify(const TriangleMesh& mesh, const Progress& progress) {
     }
   }
   out.self_intersections = self_intersections(mesh, progress).size();
-  const auto areas = area_by_provenance(mesh);
-  out.observed_area = areas[size_t(Provenance::Observed)];
-  out.single_view_area = areas[size_t(Provenance::SingleView)];
-  out.interpolated_area = areas[size_t(Provenance::Interpolated)];
-  out.estimated_area = areas[size_t(Provenance::Estimated)];
-  out.inferred_area = areas[size_t(Provenance::Inferred)];
-  out.virtual_area = areas[size_t(Provenance::Virtual)];
+  set_areas(out, mesh);
   return out;
 }
 

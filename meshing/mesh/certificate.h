@@ -48,4 +48,7 @@ bool is_closed_manifold(const TriangleMesh& mesh);
 /// \pre every face index is below mesh.vertices.size().
 Certificate certify(const TriangleMesh& mesh, const Progress& progress = {});
 
+/// Writes the areas by label anew, as of a mesh that was labelled after certify().
+void set_areas(Certificate& certificate, const TriangleMesh& mesh);
+
 }  // namespace cgs

@@ -60,13 +60,7 @@ WatertightResult watertight_surface(Volume& volume,
   const VertexEvidence evidence = annotate_vertices(result.mesh, volume);
   label_faces(result.mesh, evidence, options.max_gap * double(volume.voxel_size));
   result.mesh.normals = vertex_normals(result.mesh);
-  const auto areas = area_by_provenance(result.mesh);
-  result.certificate.observed_area = areas[size_t(Provenance::Observed)];
-  result.certificate.single_view_area = areas[size_t(Provenance::SingleView)];
-  result.certificate.interpolated_area = areas[size_t(Provenance::Interpolated)];
-  result.certificate.estimated_area = areas[size_t(Provenance::Estimated)];
-  result.certificate.inferred_area = areas[size_t(Provenance::Inferred)];
-  result.certificate.virtual_area = areas[size_t(Provenance::Virtual)];
+  set_areas(result.certificate, result.mesh);
   report(progress, 1.0);
   return result;
 }
