@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -113,15 +112,8 @@ Sources sources_of(const Cut& cut, size_t first_faces) {
 
 // The last two vertices of a mesh become one that states the lesser of both.
 void merge_claims(TriangleMesh& mesh) {
-  const size_t last = mesh.vertices.size() - 1;
-  if (!mesh.support.empty()) {
-    mesh.support[last - 1] = std::min(mesh.support[last - 1], mesh.support[last]);
-  }
-  if (!mesh.sigma.empty()) {
-    const float a = mesh.sigma[last - 1];
-    const float b = mesh.sigma[last];
-    mesh.sigma[last - 1] = std::isnan(a) || std::isnan(b) ? a + b : std::max(a, b);
-  }
+  const auto last = static_cast<uint32_t>(mesh.vertices.size() - 1);
+  take_weaker_claims(mesh, last - 1, last);
   mesh.vertices.pop_back();
   for (auto* values : {&mesh.normals, &mesh.colors}) {
     if (!values->empty()) values->pop_back();
