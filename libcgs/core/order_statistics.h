@@ -7,7 +7,8 @@
 
 namespace cgs {
 
-// All but median_of() leave the values in another order. There must be one, and no NaN among them.
+// All but median_of() and quantile_of_sorted() leave the values in another order. There must be
+// one, and no NaN among them.
 
 /// The value that k others precede in ascending order; k < values.size().
 template <typename T>
@@ -27,6 +28,12 @@ T median(std::vector<T>& values) {
 template <typename T>
 T quantile(std::vector<T>& values, double q) {
   return nth_smallest(values, static_cast<size_t>(q * static_cast<double>(values.size() - 1)));
+}
+
+/// The same of values that are in ascending order.
+template <typename T>
+T quantile_of_sorted(const std::vector<T>& values, double q) {
+  return values[static_cast<size_t>(q * static_cast<double>(values.size() - 1))];
 }
 
 /// The middle value; of an even number of them the smaller one of the two.

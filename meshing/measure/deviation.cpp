@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "meshing/mesh/measured_value.h"
 #include "meshing/mesh/mesh_distance.h"
 #include "meshing/mesh/triangle_tree.h"
@@ -29,10 +30,6 @@ ComparedPoints cloud_points(const MeasurableMesh& mesh) {
   out.sigma.assign(out.places.size(), std::nan(""));
   for (size_t v = 0; v < mesh.mesh.sigma.size(); ++v) out.sigma[v] = double(mesh.mesh.sigma[v]);
   return out;
-}
-
-double at_share(const std::vector<double>& sorted, double share) {
-  return sorted[static_cast<size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
 }  // namespace
@@ -115,12 +112,12 @@ DeviationSummary summarize(const std::vector<Deviation>& deviations) {
   for (const double d : sorted) squares += (d - out.mean) * (d - out.mean);
   out.standard_deviation = std::sqrt(squares / n);
   std::sort(sorted.begin(), sorted.end());
-  out.median = at_share(sorted, 0.5);
-  out.p05 = at_share(sorted, 0.05);
-  out.p95 = at_share(sorted, 0.95);
+  out.median = quantile_of_sorted(sorted, 0.5);
+  out.p05 = quantile_of_sorted(sorted, 0.05);
+  out.p95 = quantile_of_sorted(sorted, 0.95);
   for (double& d : sorted) d = std::abs(d);
   std::sort(sorted.begin(), sorted.end());
-  out.p95_absolute = at_share(sorted, 0.95);
+  out.p95_absolute = quantile_of_sorted(sorted, 0.95);
   out.max_absolute = sorted.back();
   return out;
 }

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "meshing/mesh/mesh_distance.h"
 #include "meshing/mesh/triangle_tree.h"
 
@@ -52,16 +53,13 @@ ThicknessPart part_of_all(std::vector<double> values, size_t all) {
   ThicknessPart out;
   if (values.empty()) return out;
   std::sort(values.begin(), values.end());
-  const auto at = [&](double share) {
-    return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
-  };
   const auto n = static_cast<double>(values.size());
   out.share = n / static_cast<double>(all);
   out.min = values.front();
-  out.p05 = at(0.05);
-  out.median = at(0.5);
+  out.p05 = quantile_of_sorted(values, 0.05);
+  out.median = quantile_of_sorted(values, 0.5);
   out.mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
-  out.p95 = at(0.95);
+  out.p95 = quantile_of_sorted(values, 0.95);
   out.max = values.back();
   return out;
 }
