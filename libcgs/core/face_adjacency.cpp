@@ -21,18 +21,4 @@ std::vector<FaceSide> sides_by_edge(const TriangleMesh& mesh) {
   return sides;
 }
 
-std::vector<std::array<uint32_t, 3>> adjacent_faces(const TriangleMesh& mesh) {
-  std::vector<std::array<uint32_t, 3>> out(mesh.faces.size());
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) out[f].fill(f);
-  const std::vector<FaceSide> sides = sides_by_edge(mesh);
-  for (size_t i = 0; i + 1 < sides.size(); ++i) {
-    const FaceSide& a = sides[i];
-    const FaceSide& b = sides[i + 1];
-    if (!a.same_edge(b)) continue;
-    out[a.face].at(a.side) = b.face;
-    out[b.face].at(b.side) = a.face;
-  }
-  return out;
-}
-
 }  // namespace cgs

@@ -13,13 +13,13 @@
 #include <Eigen/Geometry>
 
 #include "libcgs/core/error.h"
-#include "libcgs/core/face_adjacency.h"
 #include "libcgs/core/nan.h"
 #include "meshing/edit/boolean.h"
 #include "meshing/edit/hole_filling.h"
 #include "meshing/edit/repair.h"
 #include "meshing/edit/simplify.h"
 #include "meshing/mesh/components.h"
+#include "meshing/mesh/halfedges.h"
 #include "meshing/mesh/nearest_surface.h"
 #include "meshing/mesh/places.h"
 #include "meshing/mesh/self_intersections.h"
@@ -84,7 +84,7 @@ void pull_apart(TriangleMesh& mesh) {
 
 std::vector<uint8_t> open_parts(const TriangleMesh& mesh, const MeshComponents& parts) {
   std::vector<uint8_t> out(parts.area.size(), 0);
-  const auto adjacent = adjacent_faces(mesh);
+  const auto adjacent = halfedges::adjacent_faces(mesh);
   for (uint32_t f = 0; f < adjacent.size(); ++f) {
     for (const uint32_t g : adjacent[f]) {
       if (g == f) out[parts.of_face[f]] = 1;
@@ -135,7 +135,7 @@ TriangleMesh filled(const TriangleMesh& mesh) {
 std::vector<uint8_t> faces_in_the_way(const TriangleMesh& mesh) {
   std::vector<uint8_t> out(mesh.faces.size(), 0);
   for (const auto& [f, g] : self_intersections(mesh)) out[f] = out[g] = 1;
-  const auto adjacent = adjacent_faces(mesh);
+  const auto adjacent = halfedges::adjacent_faces(mesh);
   for (uint32_t f = 0; f < adjacent.size(); ++f) {
     for (const uint32_t g : adjacent[f]) {
       if (g == f) out[f] = 1;

@@ -133,10 +133,6 @@ void compare_all(const TriangleMesh& mesh) {
     return sides_by_edge(mesh).size();
   });
   compare(
-      "adjacent faces by halfedges | by sorted sides (core)",
-      [&] { return halfedges::adjacent_faces(mesh).size(); },
-      [&] { return cgs::adjacent_faces(mesh).size(); });
-  compare(
       "Loop subdivision once | OpenMesh's, without sharp edges, attributes",
       [&] { return loop_subdivided(mesh, 1).faces.size(); },
       [&] { return loop_by_openmesh(mesh); });

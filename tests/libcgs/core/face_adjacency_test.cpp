@@ -10,28 +10,34 @@
 namespace cgs::face_adjacency_test {
 namespace {
 
-TEST(AdjacentFaces, ShareTheEdgeTheyStandFor) {
+TEST(SidesByEdge, StandInPairsOfAClosedSurface) {
   const TriangleMesh mesh = test::labelled_sphere();
-  const auto adjacent = adjacent_faces(mesh);
-  ASSERT_EQ(adjacent.size(), mesh.faces.size());
-  for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    for (size_t k = 0; k < 3; ++k) {
-      const auto& other = mesh.faces[adjacent[f].at(k)];
-      EXPECT_NE(adjacent[f].at(k), f);  // the sphere is closed
-      for (const size_t corner : {k, (k + 1) % 3}) {
-        EXPECT_EQ(std::count(other.begin(), other.end(), mesh.faces[f].at(corner)), 1);
-      }
+  const std::vector<FaceSide> sides = sides_by_edge(mesh);
+  ASSERT_EQ(sides.size(), 3 * mesh.faces.size());
+  for (size_t i = 0; i < sides.size(); i += 2) {
+    EXPECT_TRUE(sides[i].same_edge(sides[i + 1]));
+    EXPECT_LT(sides[i].face, sides[i + 1].face);
+    for (const FaceSide& side : {sides[i], sides[i + 1]}) {
+      const auto& face = mesh.faces[side.face];
+      const auto [low, high] = std::minmax(face.at(side.side), face.at((side.side + 1) % 3));
+      EXPECT_EQ(low, side.low);
+      EXPECT_EQ(high, side.high);
     }
   }
 }
 
-TEST(AdjacentFaces, AreTheFaceItselfAtABorder) {
+TEST(SidesByEdge, StandAloneAtABorderAndTogetherWhereMoreMeet) {
   TriangleMesh mesh;
-  mesh.vertices.resize(4);
-  mesh.faces = {{0, 1, 2}, {2, 1, 3}};
-  const auto adjacent = adjacent_faces(mesh);
-  EXPECT_EQ(adjacent[0], (std::array<uint32_t, 3>{0, 1, 0}));
-  EXPECT_EQ(adjacent[1], (std::array<uint32_t, 3>{0, 1, 1}));
+  mesh.vertices.resize(5);
+  mesh.faces = {{0, 1, 2}, {2, 1, 3}, {1, 2, 4}};
+  const std::vector<FaceSide> sides = sides_by_edge(mesh);
+  std::vector<size_t> faces_of_edge;
+  for (size_t i = 0; i < sides.size(); ++i) {
+    if (i == 0 || !sides[i].same_edge(sides[i - 1])) faces_of_edge.push_back(0);
+    ++faces_of_edge.back();
+  }
+  // 0-1, 0-2, 1-2, 1-3, 1-4, 2-3, 2-4
+  EXPECT_EQ(faces_of_edge, (std::vector<size_t>{1, 1, 3, 1, 1, 1, 1}));
 }
 
 }  // namespace
