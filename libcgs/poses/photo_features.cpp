@@ -13,6 +13,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/lanes.h"
 
 namespace cgs {
 
@@ -111,13 +112,14 @@ class Places {
  public:
   explicit Places(const cv::Size& size)
       : columns_(static_cast<int>(size.width / kSame) + 3),
-        cells_(static_cast<size_t>(columns_) *
-               static_cast<size_t>(static_cast<int>(size.height / kSame) + 3)) {}
+        rows_(static_cast<int>(size.height / kSame) + 3),
+        cells_(static_cast<size_t>(columns_) * static_cast<size_t>(rows_)) {}
 
   // \return number of the place, counted in the order in which they were new
   int add(const cv::Point2f& at) {
-    const int x = std::max(0, static_cast<int>(double(at.x) / kSame)) + 1;
-    const int y = std::max(0, static_cast<int>(double(at.y) / kSame)) + 1;
+    // A little beside the picture counts as at its border.
+    const int x = std::clamp(static_cast<int>(double(at.x) / kSame), 0, columns_ - 3) + 1;
+    const int y = std::clamp(static_cast<int>(double(at.y) / kSame), 0, rows_ - 3) + 1;
     for (int j = y - 1; j <= y + 1; ++j) {
       for (int i = x - 1; i <= x + 1; ++i) {
         for (const int place : cell(i, j)) {
@@ -138,6 +140,7 @@ class Places {
   }
 
   int columns_;
+  int rows_;
   std::vector<std::vector<int>> cells_;
   std::vector<cv::Point2f> points_;
 };
@@ -184,6 +187,134 @@ struct Nearest {
 int point_of_row(const PhotoFeatures& features, Eigen::Index row) {
   return features.point_of.empty() ? static_cast<int>(row)
                                    : features.point_of[static_cast<size_t>(row)];
+}
+
+/// Of all rows of a in b, and of b in a.
+using NearestOfBoth = std::pair<std::vector<Nearest>, std::vector<Nearest>>;
+
+// Calls visit(dots, i, j) with the products of rows of a from i on with rows of b from j on.
+template <typename Visit>
+void for_each_block(const PhotoFeatures& a,
+                    const PhotoFeatures& b,
+                    const Progress& progress,
+                    const Visit& visit) {
+  constexpr Eigen::Index kBlock = 512;  // products of two blocks stay in the cache
+  Descriptors dots;
+  for (Eigen::Index i = 0; i < a.descriptors.rows(); i += kBlock) {
+    report(progress, double(i) / double(a.descriptors.rows()));
+    const Eigen::Index rows = std::min(kBlock, a.descriptors.rows() - i);
+    for (Eigen::Index j = 0; j < b.descriptors.rows(); j += kBlock) {
+      const Eigen::Index cols = std::min(kBlock, b.descriptors.rows() - j);
+      dots.noalias() =
+          a.descriptors.middleRows(i, rows) * b.descriptors.middleRows(j, cols).transpose();
+      visit(dots, i, j);
+    }
+  }
+}
+
+// Where points have several rows.
+NearestOfBoth nearest_of_looks(const PhotoFeatures& a,
+                               const PhotoFeatures& b,
+                               const Progress& progress) {
+  std::vector<Nearest> of_a(static_cast<size_t>(a.descriptors.rows()));
+  std::vector<Nearest> of_b(static_cast<size_t>(b.descriptors.rows()));
+  for_each_block(a, b, progress, [&](const Descriptors& dots, Eigen::Index i, Eigen::Index j) {
+    for (Eigen::Index r = 0; r < dots.rows(); ++r) {
+      const int in_a = point_of_row(a, i + r);
+      for (Eigen::Index c = 0; c < dots.cols(); ++c) {
+        of_a[static_cast<size_t>(i + r)].add(
+            dots(r, c), static_cast<int>(j + c), point_of_row(b, j + c));
+        of_b[static_cast<size_t>(j + c)].add(dots(r, c), static_cast<int>(i + r), in_a);
+      }
+    }
+  });
+  return {std::move(of_a), std::move(of_b)};
+}
+
+// Nearest rows so far, in eight lanes.
+struct NearestLanes {
+  Floats best = Floats{} - 1;
+  Floats second = Floats{} - 1;
+  Ints row = Ints{} - 1;
+
+  // The first of equal ones stays.
+  void add(const Floats& dots, const Ints& of) {
+    const Ints is_nearer = dots > best;
+    second = max(second, min(best, dots));
+    row = (is_nearer & of) | (~is_nearer & row);
+    best = max(best, dots);
+  }
+};
+
+// Nearest rows of many others, each of another point: in arrays, to be compared in lanes.
+struct NearestRows {
+  std::vector<float> best, second;
+  std::vector<int32_t> row;
+
+  explicit NearestRows(Eigen::Index rows)
+      : best(static_cast<size_t>(rows), -1), second(best), row(best.size(), -1) {}
+  void add(size_t at, float dot, int32_t of) {
+    second[at] = std::max(second[at], std::min(best[at], dot));
+    if (dot > best[at]) row[at] = of;
+    best[at] = std::max(best[at], dot);
+  }
+  // Of eight from `at` on.
+  void add(size_t at, const Floats& dots, int32_t of) {
+    NearestLanes lanes{load<Floats>(&best[at]), load<Floats>(&second[at]), load<Ints>(&row[at])};
+    lanes.add(dots, Ints{} + of);
+    store(lanes.best, &best[at]);
+    store(lanes.second, &second[at]);
+    store(lanes.row, &row[at]);
+  }
+  // What lanes have found for one, as if they had been one: the first of equal rows stays.
+  void add(size_t at, NearestLanes lanes) {
+    for (int k = 0; k < kLanes; ++k) {
+      int first = -1;
+      for (int lane = 0; lane < kLanes; ++lane) {
+        if (lanes.row[lane] < 0) continue;
+        if (first < 0 || lanes.row[lane] < lanes.row[first]) first = lane;
+      }
+      if (first < 0) return;
+      add(at, lanes.best[first], lanes.row[first]);
+      add(at, lanes.second[first], lanes.row[first]);
+      lanes.row[first] = -1;
+    }
+  }
+  std::vector<Nearest> list() const {
+    std::vector<Nearest> out;
+    out.reserve(best.size());
+    for (size_t i = 0; i < best.size(); ++i) out.push_back({best[i], second[i], row[i], row[i]});
+    return out;
+  }
+};
+
+// Where each point has one row.
+NearestOfBoth nearest_of_points(const PhotoFeatures& a,
+                                const PhotoFeatures& b,
+                                const Progress& progress) {
+  NearestRows of_a(a.descriptors.rows());
+  NearestRows of_b(b.descriptors.rows());
+  for_each_block(a, b, progress, [&](const Descriptors& dots, Eigen::Index i, Eigen::Index j) {
+    const auto in_b = static_cast<int32_t>(j);
+    for (Eigen::Index r = 0; r < dots.rows(); ++r) {
+      const float* const row = &dots(r, 0);
+      const auto in_a = static_cast<int32_t>(i + r);
+      const auto at = static_cast<size_t>(in_a);
+      NearestLanes lanes;
+      int32_t c = 0;
+      for (; c + kLanes <= static_cast<int32_t>(dots.cols()); c += kLanes) {
+        const auto eight = load<Floats>(row + c);
+        lanes.add(eight, Ints{0, 1, 2, 3, 4, 5, 6, 7} + (in_b + c));
+        of_b.add(static_cast<size_t>(in_b + c), eight, in_a);
+      }
+      of_a.add(at, lanes);
+      for (; c < static_cast<int32_t>(dots.cols()); ++c) {
+        of_a.add(at, row[c], in_b + c);
+        of_b.add(static_cast<size_t>(in_b + c), row[c], in_a);
+      }
+    }
+  });
+  return {of_a.list(), of_b.list()};
 }
 
 /// A match, and how alike its sides look.
@@ -289,27 +420,9 @@ PhotoFeatures detect_tilted_features(const ColorImage& image,
 std::vector<FeatureMatch> match_features(const PhotoFeatures& a,
                                          const PhotoFeatures& b,
                                          const Progress& progress) {
-  std::vector<Nearest> of_a(static_cast<size_t>(a.descriptors.rows()));
-  std::vector<Nearest> of_b(static_cast<size_t>(b.descriptors.rows()));
-  constexpr Eigen::Index kBlock = 512;  // products of two blocks stay in the cache
-  Descriptors dots;
-  for (Eigen::Index i = 0; i < a.descriptors.rows(); i += kBlock) {
-    report(progress, double(i) / double(a.descriptors.rows()));
-    const Eigen::Index rows = std::min(kBlock, a.descriptors.rows() - i);
-    for (Eigen::Index j = 0; j < b.descriptors.rows(); j += kBlock) {
-      const Eigen::Index cols = std::min(kBlock, b.descriptors.rows() - j);
-      dots.noalias() =
-          a.descriptors.middleRows(i, rows) * b.descriptors.middleRows(j, cols).transpose();
-      for (Eigen::Index r = 0; r < rows; ++r) {
-        const int in_a = point_of_row(a, i + r);
-        for (Eigen::Index c = 0; c < cols; ++c) {
-          of_a[static_cast<size_t>(i + r)].add(
-              dots(r, c), static_cast<int>(j + c), point_of_row(b, j + c));
-          of_b[static_cast<size_t>(j + c)].add(dots(r, c), static_cast<int>(i + r), in_a);
-        }
-      }
-    }
-  }
+  const auto [of_a, of_b] = a.point_of.empty() && b.point_of.empty()
+                                ? nearest_of_points(a, b, progress)
+                                : nearest_of_looks(a, b, progress);
   std::vector<Likeness> found;
   for (size_t i = 0; i < of_a.size(); ++i) {
     if (!of_a[i].is_distinct()) continue;
