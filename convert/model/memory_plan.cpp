@@ -89,10 +89,10 @@ double of_free_splats(SplatMethod method, double pixels) {
   return method == SplatMethod::Classical ? kOfPixel * pixels : 0;
 }
 
-// What the flow term holds: where each pixel lies in the views that its own is compared with.
-double of_flow(bool has_flow, size_t views, double pixels) {
+// Where each pixel lies in the views that its own is compared with.
+double of_matches(double lists, size_t views, double pixels) {
   const size_t compared = std::min(std::max<size_t>(views, 1) - 1, kMostCompared);
-  return has_flow ? double(sizeof(PixelMatch) * compared) * pixels : 0;
+  return lists * double(sizeof(PixelMatch) * compared) * pixels;
 }
 
 constexpr size_t kUnlimited = std::numeric_limits<size_t>::max();
@@ -128,6 +128,11 @@ void refuse_above(size_t budget, MostAt most_at) {
 
 }  // namespace
 
+double match_lists(const TrainingOptions& training) {
+  const bool is_virtual = training.virtual_weight > 0 || training.virtual_tv_weight > 0;
+  return (training.flow_weight > 0 ? 1 : 0) + (is_virtual ? 0.5 : 0);
+}
+
 std::vector<StageMemory> memory_plan(const Scene& scene, const PictureWork& work) {
   const PictureSizes input = picture_sizes(scene, scene.input, work.downscale);
   const PictureSizes held_out = picture_sizes(scene, scene.held_out, work.downscale);
@@ -152,7 +157,7 @@ std::vector<StageMemory> memory_plan(const Scene& scene, const PictureWork& work
     if (stage.id == Stage::Model) {
       bytes += of_networks(work.coherence, scene.input.size(), input.all) +
                of_free_splats(work.method, input.all) +
-               of_flow(work.has_flow, scene.input.size(), input.all);
+               of_matches(work.match_lists, scene.input.size(), input.all);
     }
     // The report shows photographs beside all that it holds; other stages read them before.
     bytes = stage.id == Stage::Report ? bytes + std::max(reading_input, reading_held_out)
@@ -202,7 +207,7 @@ void check_training_memory(const Scene& scene, size_t budget, const TrainingOpti
                        {.chooses_voxels = false,
                         .coherence = training.coherence,
                         .method = training.method,
-                        .has_flow = training.flow_weight > 0,
+                        .match_lists = match_lists(training),
                         .downscale = factor})
         .front();
   });

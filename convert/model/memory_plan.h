@@ -34,9 +34,13 @@ struct PictureWork {
   MeasuredFiles measured = {};
   CoherenceOptions coherence = {};  ///< Of the training: networks hold much more than lattices.
   SplatMethod method = SplatMethod::Coherent;  ///< Free Gaussians hold more each.
-  bool has_flow = false;  ///< The training keeps which pixels of neighbours correspond.
-  int downscale = 1;      ///< Divides the sides of the pictures once more.
+  double match_lists = 0;                      ///< match_lists() of the training.
+  int downscale = 1;                           ///< Divides the sides of the pictures once more.
 };
+
+/// How many lists of corresponding pixels a training keeps, per view and neighbour: one of the flow
+/// term, and one for both of the views between which virtual ones stand.
+double match_lists(const TrainingOptions& training);
 
 /// Predicts what the stages of a run will need, from the sizes of its pictures alone.
 ///

@@ -18,7 +18,7 @@ PictureWork picture_work(const RunRequest& request) {
                        .asset = !request.max_error.empty() || request.max_size > 0},
           .coherence = request.training.coherence,
           .method = request.training.method,
-          .has_flow = request.training.flow_weight > 0};
+          .match_lists = match_lists(request.training)};
 }
 
 void check_lengths(const RunRequest& request, Frame frame) {

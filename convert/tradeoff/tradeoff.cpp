@@ -117,7 +117,7 @@ StageResults run_setting(Bench& bench, const Setting& setting) {
                       {.chooses_voxels = setting.voxel == 1,
                        .coherence = bench.standard.training.coherence,
                        .method = bench.standard.training.method,
-                       .has_flow = bench.standard.training.flow_weight > 0,
+                       .match_lists = match_lists(bench.standard.training),
                        .downscale = setting.coarser},
                       memory_budget(bench.request.memory_limit));
     return make_model(request(model_key(setting)), bench.request.output, bench.scene, progress);

@@ -98,6 +98,11 @@ void AtomicFile::write(std::span<const std::byte> bytes) {
   write(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
+void AtomicFile::sync() {
+  flush_buffer();
+  sync_to_disk(descriptor_, path_);
+}
+
 std::filesystem::path AtomicFile::release_to_library() {
   flush_buffer();
   ::close(std::exchange(descriptor_, -1));

@@ -27,6 +27,10 @@ class AtomicFile {
   void write(std::string_view bytes);
   void write(std::span<const std::byte> bytes);
 
+  /// All that was written so far lies on the disk; only commit() gives it its name.
+  /// \throws IoError if the disk does not take all of it.
+  void sync();
+
   /// For libraries that only write to a path: the temporary's path, after closing our handle.
   /// commit() then reopens it to flush it.
   std::filesystem::path release_to_library();

@@ -260,7 +260,7 @@ class Companions {
   void write(const std::filesystem::path& path, std::string_view bytes) {
     files_.push_back({path, std::make_unique<AtomicFile>(path)});
     files_.back().second->write(bytes);
-    (void)files_.back().second->release_to_library();  // all of it is written now
+    files_.back().second->sync();
   }
   void commit() {
     for (const auto& [path, file] : files_) {
@@ -303,7 +303,7 @@ void write_obj(const std::filesystem::path& path,
     companions.write(path.parent_path() / image_name(path, used.names[i]), used.images[i].jpeg);
   }
   companions.write(materials, materials_text(path, mesh, used));
-  (void)file.release_to_library();
+  file.sync();
   companions.commit();
   file.commit();
   companions.keep();

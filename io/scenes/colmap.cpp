@@ -95,8 +95,7 @@ std::string largest_model(const SceneRoot& root, Scene& scene) {
 std::string photograph_folder(const SceneRoot& root,
                               const std::string& model_folder,
                               const ColmapModel& model) {
-  // Smaller copies are read where they are all that was kept of a published scene.
-  std::vector<std::string> places = {"images", "input", ".", "images_2", "images_4", "images_8"};
+  std::vector<std::string> places = {"images", "input", "."};
   for (const std::string base : {"colmap", "distorted"}) {
     if (!model_folder.starts_with(base + "/")) continue;
     places.insert(places.begin(), base + "/images");
@@ -105,8 +104,8 @@ std::string photograph_folder(const SceneRoot& root,
   }
   std::string best = is_folder(root.folder / "images") ? "images" : ".";
   size_t most = 0;
-  for (const std::string& place : places) {
-    if (!is_folder(root.folder / place)) continue;
+  const auto try_place = [&](const std::string& place) {
+    if (!is_folder(root.folder / place)) return;
     size_t count = 0;
     for (const ColmapImage& image : model.images) {
       const fs::path name = with_slashes(image.name);
@@ -114,6 +113,11 @@ std::string photograph_folder(const SceneRoot& root,
     }
     if (count > most) best = place;
     most = std::max(most, count);
+  };
+  std::for_each(places.begin(), places.end(), try_place);
+  // Smaller copies, where they are all that was kept of a published scene.
+  for (const char* copies : {"images_2", "images_4", "images_8"}) {
+    if (most == 0) try_place(copies);
   }
   return best;
 }

@@ -13,9 +13,9 @@ bool is_colmap(const std::filesystem::path& folder);
 /// Reads a COLMAP reconstruction: the model in sparse/0, sparse/1 …, sparse or the folder itself,
 /// else in sparse_3/0 and such, colmap/sparse/ or distorted/sparse/; of several in one place that
 /// with most images, which is told. Binary files are preferred over text. The photographs lie in
-/// images/, input/ or beside the model, wherever most of them are; their names may differ from
-/// those of the model as PhotographIndex::take_path() says. Cameras that no image names are not
-/// judged.
+/// images/, input/ or beside the model, wherever most of them are, or smaller ones in images_2/,
+/// images_4/ or images_8/ where none are; their names may differ from those of the model as
+/// PhotographIndex::take_path() says. Cameras that no image names are not judged.
 ///
 /// Cameras have the size the model states, and lens distortion is left to load_images(). Points
 /// keep the views that observed them; what is wrong with single points is dropped and counted in

@@ -9,7 +9,7 @@
 
 namespace cgs {
 
-/// How much a file of splats holds, by its header alone.
+/// How much a file of splats holds, as it states it.
 struct SplatCount {
   uint64_t splats = 0;
   uint64_t harmonics = 1;  ///< RGB coefficients of each.

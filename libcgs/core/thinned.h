@@ -6,14 +6,15 @@
 
 namespace cgs {
 
-/// Evenly out of many, `most` at most and in their order: for a bounded time and memory.
+/// Evenly out of many, `most` where there are so many and in their order: for a bounded time and
+/// memory.
 /// \pre most > 0
 template <typename T>
 std::vector<T> thinned(const std::vector<T>& all, size_t most) {
-  const size_t step = (all.size() + most - 1) / most;
-  if (step <= 1) return all;
+  if (all.size() <= most) return all;
   std::vector<T> out;
-  for (size_t i = 0; i < all.size(); i += step) out.push_back(all[i]);
+  out.reserve(most);
+  for (size_t i = 0; i < most; ++i) out.push_back(all[i * all.size() / most]);
   return out;
 }
 

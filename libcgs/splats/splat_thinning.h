@@ -50,8 +50,8 @@ inline constexpr double kMostThinningLoss = 0.2;
 /// 10 log10(1 + D / E) dB against a photograph taken there, as neither error knows of the other.
 /// What differs by no more than a step of eight bits is always allowed: E counts as large enough
 /// for that. Judged is the mean over the input views and over cameras that were not fitted to. Of
-/// more than twelve input views, about as many are fitted to and judged by, evenly chosen; which
-/// splats show anything is told by all.
+/// more than twelve input views, a dozen are fitted to and judged by, evenly chosen; which splats
+/// show anything is told by all.
 /// The same choice and the same bits every time, for any number of threads.
 ///
 /// \param scene   with the pixels of its input views

@@ -141,9 +141,9 @@ class NewIntersections {
     const auto pairs = self_intersections(result);
     std::vector<uint32_t> out;
     if (pairs.empty()) return out;
-    if (!given_) find_given();
+    if (!is_input_known_) find_given();
     for (const auto& pair : pairs) {
-      if (std::binary_search(given_->begin(), given_->end(), places_of(result, pair))) continue;
+      if (std::binary_search(given_.begin(), given_.end(), places_of(result, pair))) continue;
       out.insert(out.end(), {pair.first, pair.second});
     }
     return out;
@@ -151,13 +151,18 @@ class NewIntersections {
 
  private:
   void find_given() {
-    given_.emplace();
-    for (const auto& pair : self_intersections(input_)) given_->push_back(places_of(input_, pair));
-    std::sort(given_->begin(), given_->end());
+    is_input_known_ = true;
+    try {
+      for (const auto& pair : self_intersections(input_)) given_.push_back(places_of(input_, pair));
+    } catch (const LimitError&) {
+      return;  // too many to be held: none of them is excused
+    }
+    std::sort(given_.begin(), given_.end());
   }
 
   const TriangleMesh& input_;
-  std::optional<std::vector<PairPlaces>> given_;  // ascending; known once it is asked for
+  bool is_input_known_ = false;
+  std::vector<PairPlaces> given_;  // of the input, ascending
 };
 
 // Holds input vertices nearer to the result than in the last round.

@@ -153,17 +153,22 @@ TEST(MemoryPlan, CountsCorrespondingPixelsOfNeighbours) {
   const auto added = [](size_t views) {
     const Scene scene = scene_of(views, 400, 300);
     const size_t without = memory_plan(scene).front().bytes;
-    return double(memory_plan(scene, {.has_flow = true}).front().bytes - without) / double(views);
+    return double(memory_plan(scene, {.match_lists = 1}).front().bytes - without) / double(views);
   };
   EXPECT_GE(added(3), 2 * 12.0 * 400 * 300 - 1) << "both other views";
   EXPECT_GT(added(6), 2 * added(3));
   EXPECT_NEAR(added(40), added(20), 1) << "no more than the best eight";
   const Scene scene = scene_of(3, 400, 300);
-  const size_t needed = memory_plan(scene, {.has_flow = true}).front().bytes;
   TrainingOptions flow;
   flow.flow_weight = 1;
+  EXPECT_EQ(match_lists(flow), 1);
+  const size_t needed = memory_plan(scene, {.match_lists = 1}).front().bytes;
   EXPECT_THROW(check_training_memory(scene, needed - 1, flow), LimitError);
   EXPECT_NO_THROW(check_training_memory(scene, needed - 1, {}));
+  TrainingOptions between;
+  between.virtual_weight = 0.1;
+  EXPECT_EQ(match_lists(between), 0.5) << "one for both";
+  EXPECT_EQ(match_lists({}), 0);
 }
 
 TEST(MemoryPlan, CountsWhatFreeGaussiansHold) {

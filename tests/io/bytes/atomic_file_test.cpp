@@ -26,6 +26,17 @@ TEST(AtomicFile, AppearsOnlyOnCommit) {
   EXPECT_EQ(test::entries(dir.path()), 1);
 }
 
+TEST(AtomicFile, GoesOnAfterWhatItHasIsOnTheDisk) {
+  test::TempDir dir;
+  AtomicFile file(dir / "out.bin");
+  file.write("one ");
+  file.sync();
+  EXPECT_FALSE(std::filesystem::exists(dir / "out.bin"));
+  file.write("two");
+  file.commit();
+  EXPECT_EQ(test::read_bytes(dir / "out.bin"), "one two");
+}
+
 TEST(AtomicFile, LeavesTheOldFileAndNoTemporaryWithoutCommit) {
   const test::TempDir dir;
   write_file(dir / "a.txt", "old");

@@ -107,6 +107,10 @@ TEST_F(ReadColmap, TakesSmallerCopiesWhereTheyAreAllThatIsThere) {
   ASSERT_EQ(scene.views.size(), 2u);
   EXPECT_TRUE(scene.missing.empty());
   EXPECT_EQ(scene.views[0].image_path.parent_path().filename(), "images_4");
+  // Not where photographs themselves are there, though one was left out.
+  test::write_bytes(dir_ / "images/a.png", test::rgb_png(80, 60));
+  EXPECT_EQ(read().views[0].image_path.parent_path().filename(), "images");
+  EXPECT_EQ(read().missing.size(), 1u);
 }
 
 TEST_F(ReadColmap, JudgesNoCameraThatNoImageNames) {

@@ -91,9 +91,8 @@ TEST_F(ReadScene, FollowsTheLlffProtocolAboveFourViewsOfLlff) {
 }
 
 TEST_F(ReadScene, RefusesOptionsOutOfRange) {
-  EXPECT_NO_THROW(SceneOptions{}.validate());
-  EXPECT_THROW(SceneOptions{.downscale = 0}.validate(), InvalidInput);
   write(2);
+  EXPECT_THROW(read({.downscale = 0}), InvalidInput);
   EXPECT_THROW(read({.downscale = 20}), InvalidInput);
 }
 

@@ -143,10 +143,17 @@ TEST(SeenSurface, HasNoBack) {
   for (const float z : surface.depth.data) EXPECT_TRUE(std::isnan(z));
 }
 
-// Corners of its cells are up to 1e11 pixels away.
+// Corners of its cells are up to 1e11 pixels away, and those in the middle reach over a quarter of
+// the picture.
 TEST(SeenSurface, EndsWhereTheCameraAllButTouchesIt) {
-  const Camera camera = camera_at({0, 0, 0});
-  const SeenSurface surface = seen(camera, DepthMap(80, 60, 1), camera_at({0, 0, 1 - 1e-10}));
+  Camera camera = camera_at({0, 0, 0});
+  camera.width = 160;
+  camera.height = 120;
+  camera.cx = 80;
+  camera.cy = 60;
+  Camera touching = camera;
+  touching.world_from_cam.translation().z() = 1 - 1e-10;
+  const SeenSurface surface = seen(camera, DepthMap(160, 120, 1), touching);
   for (const int32_t pixel : surface.pixel.data) ASSERT_EQ(pixel, -1);
 }
 
