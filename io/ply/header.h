@@ -38,7 +38,7 @@ struct PlyHeader {
   std::vector<std::string> comments;  ///< Text after "comment " and "obj_info ".
   size_t data_offset = 0;             ///< First byte after the end_header line.
   size_t line_count = 0;              ///< Lines of the header.
-  char line_end = '\n';               ///< Of its lines, and those of ASCII; may have '\r' before.
+  char line_end = '\n';               ///< Of its lines, and those of ASCII: LF or CR.
 
   const PlyElement* find(std::string_view element) const;
 };

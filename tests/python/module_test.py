@@ -5,9 +5,9 @@
 usage: module_test.py PROGRAM CAPTURE WORK_FOLDER     (PYTHONPATH has the module)
 """
 import gc
+import importlib.util
 import json
 import os
-import shutil
 import shutil
 import signal
 import subprocess
@@ -338,6 +338,48 @@ class Meshes(unittest.TestCase):
         with_unit = cgs.Mesh(points, [[0, 1, 2]], metres_per_unit=1)
         with self.assertRaisesRegex(cgs.InvalidInput, "how long a unit"):
             with_unit.compare(square(0))
+
+
+@unittest.skipUnless(importlib.util.find_spec("open3d"), "Open3D is not installed")
+class ExchangeWithOpen3d(unittest.TestCase):
+    """As samples/python/02_depth_frames_to_mesh.py says."""
+
+    @classmethod
+    def setUpClass(cls):
+        import open3d
+
+        cls.open3d = open3d
+        cameras = six_cameras()
+        depth = [ball_depth(camera) for camera in cameras]
+        cls.mesh = cgs.fuse(cameras, depth, voxel_size=0.05).surface()
+
+    def theirs(self, mesh):
+        utility = self.open3d.utility
+        return self.open3d.geometry.TriangleMesh(
+            utility.Vector3dVector(mesh.vertices),
+            utility.Vector3iVector(mesh.faces.astype("int32")),
+        )
+
+    def test_of_meshes_keeps_every_number(self):
+        theirs = self.theirs(self.mesh)
+        area = self.mesh.measure(area=True)["area"]["value"]
+        self.assertAlmostEqual(theirs.get_surface_area(), area, delta=1e-6 * area)
+        again = cgs.Mesh(np.asarray(theirs.vertices), np.asarray(theirs.triangles))
+        np.testing.assert_array_equal(again.vertices, self.mesh.vertices)
+        np.testing.assert_array_equal(again.faces, self.mesh.faces)
+
+    def test_of_what_they_simplified_can_be_measured(self):
+        theirs = self.theirs(self.mesh).simplify_quadric_decimation(2000)
+        mesh = cgs.Mesh(np.asarray(theirs.vertices), np.asarray(theirs.triangles))
+        self.assertLessEqual(len(mesh.faces), 2000)
+        distances = mesh.compare(self.mesh)["distance"]
+        self.assertLess(np.nanmax(np.abs(distances)), 0.05)
+
+    def test_of_points_keeps_every_number(self):
+        points = self.open3d.utility.Vector3dVector(self.mesh.vertices)
+        cloud = self.open3d.geometry.PointCloud(points)
+        again = cgs.Mesh(np.asarray(cloud.points))
+        np.testing.assert_array_equal(again.vertices, self.mesh.vertices)
 
 
 class Splats(unittest.TestCase):
