@@ -5,19 +5,13 @@
 #include <utility>
 
 #include "io/bytes/byte_reader.h"
+#include "io/bytes/percent_encoding.h"
 #include "io/bytes/scene_path.h"
 #include "libcgs/core/remedy.h"
 
 namespace cgs {
 
 namespace {
-
-int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
 
 int base64_digit(char c) {
   if (c >= 'A' && c <= 'Z') return c - 'A';
@@ -67,19 +61,6 @@ std::string data_of(std::string_view rest, const JsonValue& object) {
 }
 
 }  // namespace
-
-std::string percent_decoded(std::string_view text) {
-  std::string out;
-  out.reserve(text.size());
-  for (size_t i = 0; i < text.size(); ++i) {
-    const bool is_code = text[i] == '%' && i + 2 < text.size() && hex_digit(text[i + 1]) >= 0 &&
-                         hex_digit(text[i + 2]) >= 0;
-    out +=
-        is_code ? static_cast<char>(16 * hex_digit(text[i + 1]) + hex_digit(text[i + 2])) : text[i];
-    if (is_code) i += 2;
-  }
-  return out;
-}
 
 std::filesystem::path resolve_beside(const std::filesystem::path& file,
                                      const std::string& name,

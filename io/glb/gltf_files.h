@@ -11,11 +11,6 @@
 
 namespace cgs {
 
-/// A text without its percent-encoding. A '%' that no two digits follow stays: programs write names
-/// as they are.
-/// Source: RFC 3986, section 2.1.
-std::string percent_decoded(std::string_view text);
-
 /// Where a name leads that a file states of another one beside it. Meshes and splats come alone, so
 /// that nobody can vouch for what they name outside of their folder.
 /// \param stated  the name in the file, for the message

@@ -9,7 +9,7 @@
 
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/byte_writer.h"
-#include "io/glb/gltf_files.h"
+#include "io/bytes/percent_encoding.h"
 #include "io/ply/frame.h"
 #include "io/ply/rows.h"
 #include "io/splats/splat_arrays.h"
@@ -26,24 +26,6 @@ constexpr std::string_view kSyntheticComment = "synthetic ";
 
 constexpr size_t kLongestHeader = 131072;  // of those that write_gaussian_ply() writes
 
-/// A name in ASCII, for a header that programs of others take for that; percent_decoded() undoes
-/// it.
-std::string ascii_name(std::string_view name) {
-  constexpr std::string_view kDigits = "0123456789ABCDEF";
-  std::string out;
-  for (const char c : name) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x80 && c != '%') {
-      out += c;
-    } else {
-      out += '%';
-      out += kDigits[byte / 16];
-      out += kDigits[byte % 16];
-    }
-  }
-  return out;
-}
-
 std::string header_start(const Frame& frame,
                          const std::string& evidence,
                          const std::vector<SyntheticSource>& sources) {
@@ -53,7 +35,7 @@ std::string header_start(const Frame& frame,
   for (size_t k = 0; k < sources.size(); ++k) {
     const auto& [file, sha256] = sources[k];
     out += "comment " + std::string(kSyntheticComment) + std::to_string(k + 1) +
-           " sha256:" + sha256 + " " + ascii_name(one_line(file)) + "\n";
+           " sha256:" + sha256 + " " + percent_encoded(one_line(file)) + "\n";
   }
   return out;
 }

@@ -43,30 +43,34 @@ struct RayPair {
   double angle = 0;
 };
 
-RayPair widest_pair(const std::vector<Ray>& rays) {
-  RayPair widest;
+template <typename Visit>
+void for_each_pair(const std::vector<Ray>& rays, const Visit& visit) {
   for (size_t i = 0; i < rays.size(); ++i) {
     for (size_t j = i + 1; j < rays.size(); ++j) {
-      const double angle = angle_between(rays[i].direction, rays[j].direction);
-      if (angle > widest.angle) widest = {i, j, angle};
+      visit(RayPair{i, j, angle_between(rays[i].direction, rays[j].direction)});
     }
   }
+}
+
+RayPair widest_pair(const std::vector<Ray>& rays) {
+  RayPair widest;
+  for_each_pair(rays, [&](const RayPair& pair) {
+    if (pair.angle > widest.angle) widest = pair;
+  });
   return widest;
 }
 
-// The widest first, as many as are worth trying.
-std::vector<RayPair> wide_pairs(const std::vector<Ray>& rays, double least_angle) {
+// As many as are worth trying after the widest, in that order.
+std::vector<RayPair> next_widest(const std::vector<Ray>& rays, double least_angle) {
   std::vector<RayPair> out;
-  for (size_t i = 0; i < rays.size(); ++i) {
-    for (size_t j = i + 1; j < rays.size(); ++j) {
-      const double angle = angle_between(rays[i].direction, rays[j].direction);
-      if (angle >= least_angle) out.push_back({i, j, angle});
-    }
-  }
+  for_each_pair(rays, [&](const RayPair& pair) {
+    if (pair.angle >= least_angle) out.push_back(pair);
+  });
   std::stable_sort(
       out.begin(), out.end(), [](const RayPair& x, const RayPair& y) { return x.angle > y.angle; });
-  constexpr size_t kMost = 8;
+  constexpr size_t kMost = 8;  // with the widest
   if (out.size() > kMost) out.resize(kMost);
+  if (!out.empty()) out.erase(out.begin());
   return out;
 }
 
@@ -135,7 +139,7 @@ void triangulate(Reconstruction& scene, double most_error, double least_angle) {
     if (!(widest.angle >= least_angle)) continue;
     bool is_found = is_met(scene, rays, widest, most_error, track);
     if (!is_found && rays.size() > 2) {  // a wrong observation is likely to be one of the widest
-      const std::vector<RayPair> pairs = wide_pairs(rays, least_angle);
+      const std::vector<RayPair> pairs = next_widest(rays, least_angle);
       is_found = std::any_of(pairs.begin(), pairs.end(), [&](const RayPair& pair) {
         return is_met(scene, rays, pair, most_error, track);
       });

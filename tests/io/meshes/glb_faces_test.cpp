@@ -9,6 +9,7 @@
 #include "io/meshes/glb_reader.h"
 #include "io/meshes/mesh_file.h"
 #include "tests/support/full_disk.h"
+#include "tests/support/solid_meshes.h"
 #include "tests/support/triangle_glb.h"
 
 namespace cgs::glb_faces_test {
@@ -190,18 +191,7 @@ TEST(GlbFaces, AttributesBesideACompressedMeshAreReadToo) {
   for (size_t i = 0; i < 8; ++i) {
     box.positions.emplace_back(corners[3 * i], corners[3 * i + 1], corners[3 * i + 2]);
   }
-  box.faces = {{0, 2, 1},
-               {1, 2, 3},
-               {4, 5, 6},
-               {5, 7, 6},
-               {0, 1, 4},
-               {1, 5, 4},
-               {2, 6, 3},
-               {3, 6, 7},
-               {0, 4, 2},
-               {2, 4, 6},
-               {1, 3, 5},
-               {3, 7, 5}};
+  box.faces = test::cube_mesh().mesh.faces;
   const DracoPrimitive packed = draco_compress(box, {Eigen::Vector3f::Zero(), 4, 14}, 5);
   t.primitive()["extensions"]["KHR_draco_mesh_compression"] = {
       {"bufferView", t.view(std::vector<char>(packed.bytes.begin(), packed.bytes.end()))},

@@ -82,6 +82,21 @@ void add_pixels(const SupportView& view, Gaussians& g) {
   }
 }
 
+// What input views from these cameras see, and the Gaussians of their pixels.
+struct Inputs {
+  std::vector<SupportView> views;
+  Gaussians gaussians;
+};
+
+Inputs inputs_of(const WallAndBox& scene, const std::vector<Camera>& cameras) {
+  Inputs out;
+  for (const Camera& camera : cameras) {
+    out.views.push_back(view_of(scene, camera));
+    add_pixels(out.views.back(), out.gaussians);
+  }
+  return out;
+}
+
 struct HoleScore {
   double iou = 0;
   size_t truth = 0;
@@ -91,12 +106,7 @@ struct HoleScore {
 
 HoleScore score_holes(const std::vector<Camera>& inputs, const Camera& novel) {
   const WallAndBox scene;
-  std::vector<SupportView> views;
-  Gaussians g;
-  for (const Camera& camera : inputs) {
-    views.push_back(view_of(scene, camera));
-    add_pixels(views.back(), g);
-  }
+  const auto [views, g] = inputs_of(scene, inputs);
   RenderBuffers buffers = rasterize(g, novel);
   annotate_support(buffers, novel, views);
   HoleScore score;
@@ -154,12 +164,7 @@ TEST(AnnotateSupport, InventsNoHolesWhereEverythingWasSeen) {
 
 TEST(AnnotateSupport, CountsTheViewsThatSeeTheSurface) {
   const WallAndBox scene;
-  std::vector<SupportView> views;
-  Gaussians g;
-  for (const Camera& camera : three_in_a_row()) {
-    views.push_back(view_of(scene, camera));
-    add_pixels(views.back(), g);
-  }
+  const auto [views, g] = inputs_of(scene, three_in_a_row());
   const Camera novel = camera_at({0.02, 0.01, 0});
   RenderBuffers buffers = rasterize(g, novel);
   annotate_support(buffers, novel, views);
@@ -309,13 +314,10 @@ TEST(AnnotateSupport, FindsNoWitnessBehindOrBesideItsImage) {
 
 TEST(AnnotateSupport, IsTheSameOfViewsThatAreLinkedOnceForAll) {
   const WallAndBox scene;
-  std::vector<SupportView> views;
-  Gaussians g;
-  for (const Camera& camera : three_in_a_row()) {
-    views.push_back(view_of(scene, camera));
-    add_pixels(views.back(), g);
-    views.back().sigma = DepthMap(camera.width, camera.height, 0.01f);  // widens gaps
-    views.back().depth(50, 60) = kNan;
+  auto [views, g] = inputs_of(scene, three_in_a_row());
+  for (SupportView& view : views) {
+    view.sigma = DepthMap(view.camera.width, view.camera.height, 0.01f);  // widens gaps
+    view.depth(50, 60) = kNan;
   }
   const Camera novel = camera_at({0.12, 0.05, 0.1});
   RenderBuffers expected = rasterize(g, novel);
