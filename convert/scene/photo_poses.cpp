@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <map>
 #include <optional>
 #include <set>
 #include <tuple>
@@ -140,12 +141,34 @@ std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
   }
 }
 
+// Quarter turns, clockwise, that make upright what lies in the file. Mirrored ones are counted as
+// none: their lenses are their own, by lens_of().
+int quarter_turns(int orientation) {
+  switch (orientation) {
+    case 3:
+      return 2;
+    case 6:
+      return 1;
+    case 8:
+      return 3;
+    default:
+      return 0;
+  }
+}
+
 // Photographs of one camera, size and stated focal length, also where that is no number of pixels,
-// share a lens.
+// share a lens, upright or lying: as their sensor lay they are alike.
 int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) {
   const auto key = [](const PhotoFile& p) {
-    return std::tie(
-        p.size.width, p.size.height, p.hint.camera, p.hint.focal, p.hint.marked, p.hint.zoom);
+    const bool is_mirrored = p.orientation != 1 && quarter_turns(p.orientation) == 0;
+    const ImageSize stored = turned(p.size, p.orientation);
+    return std::tuple(stored.width,
+                      stored.height,
+                      is_mirrored ? p.orientation : 1,
+                      p.hint.camera,
+                      p.hint.focal,
+                      p.hint.marked,
+                      p.hint.zoom);
   };
   const auto same = std::find_if(lenses.begin(), lenses.end(), [&](const PhotoFile* other) {
     return key(*other) == key(photograph);
@@ -178,6 +201,7 @@ UnposedPhoto unposed_photo(MaskIndex& masks,
                             : detect_features(image, usable);
   out.focal = photograph.hint.focal;
   out.focal_sigma = photograph.hint.sigma;
+  out.turns = quarter_turns(photograph.orientation);
   for (const Eigen::Vector2d& p : out.features.points) {
     const int x = std::clamp(static_cast<int>(p.x()), 0, image.width - 1);
     const int y = std::clamp(static_cast<int>(p.y()), 0, image.height - 1);
@@ -238,18 +262,29 @@ void add_remarks(const std::vector<UnposedPhoto>& photos,
   }
 }
 
+// COLMAP's cameras, numbered from 1: one per lens and way that photographs are turned.
+std::vector<uint32_t> camera_ids(const std::vector<UnposedPhoto>& photos) {
+  std::map<std::pair<int, int>, uint32_t> ids;
+  std::vector<uint32_t> out;
+  for (const UnposedPhoto& photo : photos) {
+    const auto next = static_cast<uint32_t>(ids.size() + 1);
+    out.push_back(ids.emplace(std::pair(photo.lens, photo.turns), next).first->second);
+  }
+  return out;
+}
+
 ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
                          const std::vector<Colors>& colors,
                          const PoseSolution& solution) {
   ColmapModel model;
+  const std::vector<uint32_t> camera_of = camera_ids(photos);
   for (size_t i = 0; i < photos.size(); ++i) {
     const SolvedPhoto& solved = solution.photos[i];
     if (!solved.is_placed) continue;
-    const auto camera_id = static_cast<uint32_t>(photos[i].lens + 1);
-    model.cameras[camera_id] = {solved.camera, {solved.k1, 0, 0, 0, 0}, {}};
+    model.cameras[camera_of[i]] = {solved.camera, {solved.k1, 0, 0, 0, 0}, {}};
     ColmapImage image;
     image.id = static_cast<uint32_t>(i + 1);
-    image.camera_id = camera_id;
+    image.camera_id = camera_of[i];
     image.name = photos[i].name;
     const Eigen::Quaterniond& q = solved.rotation;
     image.rotation = {q.w(), q.x(), q.y(), q.z()};

@@ -25,6 +25,7 @@ constexpr size_t kPerLens = 4;
 struct Reprojection {
   Eigen::Vector2d at;
   double sigma;
+  int turns;
 
   template <typename T>
   bool operator()(
@@ -36,7 +37,7 @@ struct Reprojection {
     if (!(p.z() > T(0))) return false;
     const Eigen::Matrix<T, 2, 1> direction = p.template head<2>() / p.z();
     using std::exp;
-    const Eigen::Matrix<T, 2, 1> centre(lens[2], lens[3]);
+    const auto centre = turned(Eigen::Matrix<T, 2, 1>(lens[2], lens[3]), turns);
     const Eigen::Matrix<T, 2, 1> seen = through_lens<T>(exp(lens[0]), lens[1], centre, direction);
     out[0] = (seen.x() - T(at.x())) / T(sigma);
     out[1] = (seen.y() - T(at.y())) / T(sigma);
@@ -152,7 +153,7 @@ void add_observations(const Reconstruction& scene,
       const auto photo = static_cast<size_t>(s.photo);
       if (!s.is_used || !scene.poses[photo]) continue;
       problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Reprojection, 2, 4, 3, kPerLens, 3>(
-                                   new Reprojection{s.at, s.sigma}),
+                                   new Reprojection{s.at, s.sigma, scene.turns_of(s.photo)}),
                                loss,
                                unknowns.rotation(photo),
                                unknowns.translation(photo),

@@ -236,8 +236,8 @@ std::optional<Matrix2d> expected_warp(const Reconstruction& scene,
                                       const Observation& to) {
   const PhotoPose& from_pose = *scene.pose(from.photo);
   const PhotoPose& to_pose = *scene.pose(to.photo);
-  const Lens& from_lens = scene.lens(from.photo);
-  const Lens& to_lens = scene.lens(to.photo);
+  const Lens from_lens = scene.lens(from.photo);
+  const Lens to_lens = scene.lens(to.photo);
   const Vector3d centre = from_pose.center();
   const Vector3d normal = (centre - point).normalized() + (to_pose.center() - point).normalized();
   const auto transferred = [&](const Vector2d& d) -> Vector2d {

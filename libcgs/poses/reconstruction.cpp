@@ -126,7 +126,7 @@ double reprojection_error(const Reconstruction& scene,
                           const Observation& observation) {
   const Eigen::Vector3d p = *scene.pose(observation.photo) * position;
   if (!(p.z() > 0)) return std::numeric_limits<double>::infinity();
-  const Lens& lens = scene.lens(observation.photo);
+  const Lens lens = scene.lens(observation.photo);
   const Eigen::Vector2d direction = p.hnormalized();
   return (through_lens(lens.focal, lens.k1, lens.centre, direction) - observation.at).norm();
 }

@@ -46,16 +46,36 @@ struct Track {
   bool is_known = false;  ///< position is triangulated.
 };
 
+/// A place from the centre of a picture after quarter turns of the picture, clockwise as seen.
+template <typename T>
+Eigen::Matrix<T, 2, 1> turned(const Eigen::Matrix<T, 2, 1>& at, int quarters) {
+  switch (quarters & 3) {
+    case 1:
+      return {-at.y(), at.x()};
+    case 2:
+      return {-at.x(), -at.y()};
+    case 3:
+      return {at.y(), -at.x()};
+    default:
+      return at;
+  }
+}
+
 /// Cameras and points while they are being solved. A working pixel is the pixel of the picture in
 /// which features were found, so that errors of all photographs are comparable.
 struct Reconstruction {
-  std::vector<Lens> lenses;
+  std::vector<Lens> lenses;                     ///< As their sensors lie.
   std::vector<int> lens_of;                     ///< Per photograph.
+  std::vector<int> turns;                       ///< As UnposedPhoto::turns; empty = none is turned.
   std::vector<std::optional<PhotoPose>> poses;  ///< Per photograph; nothing = not yet placed.
   std::vector<Track> tracks;
 
-  const Lens& lens(int photo) const {
-    return lenses[static_cast<size_t>(lens_of[static_cast<size_t>(photo)])];
+  int turns_of(int photo) const { return turns.empty() ? 0 : turns[static_cast<size_t>(photo)]; }
+  /// The lens of a photograph, turned as it is.
+  Lens lens(int photo) const {
+    Lens out = lenses[static_cast<size_t>(lens_of[static_cast<size_t>(photo)])];
+    out.centre = turned(out.centre, turns_of(photo));
+    return out;
   }
   const std::optional<PhotoPose>& pose(int photo) const {
     return poses[static_cast<size_t>(photo)];

@@ -95,12 +95,14 @@ Frame frame_of(const std::vector<PosedPhoto>& photos, const Gauge& gauge) {
 }
 
 // Points from the poses as they are now; every observation may count again.
-void triangulate_anew(Reconstruction& scene, double most_error) {
+void triangulate_anew(const std::vector<LensPrior>& lenses,
+                      double most_error,
+                      Reconstruction& scene) {
   for (Track& track : scene.tracks) {
     track.is_known = false;
     for (Observation& s : track.seen) s.is_used = true;
   }
-  triangulate(scene, most_error, kLeastAngle);
+  triangulate(scene, most_error, least_angle(lenses));
 }
 
 void adjust(const std::vector<LensPrior>& lenses,
@@ -111,11 +113,11 @@ void adjust(const std::vector<LensPrior>& lenses,
   for (const double most_error : kRounds) {
     options.progress = part_of(progress, done / kRounds.size(), (done + 1) / kRounds.size());
     ++done;
-    triangulate_anew(scene, most_error);
+    triangulate_anew(lenses, most_error, scene);
     options.loss_scale = kLossShare * most_error;
     adjust_bundle(scene, lenses, options);
   }
-  drop_outliers(scene, kRounds.back(), kLeastAngle);
+  drop_outliers(scene, kRounds.back(), least_angle(lenses));
 }
 
 // Distances of the used observations of a photograph [working pixels].

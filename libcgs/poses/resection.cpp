@@ -57,9 +57,9 @@ void forget(Reconstruction& scene) {
 void settle(Reconstruction& scene,
             const std::vector<LensPrior>& priors,
             const BundleOptions& options) {
-  triangulate(scene, kMostError, kLeastAngle);
+  triangulate(scene, kMostError, least_angle(priors));
   adjust_bundle(scene, priors, options);
-  drop_outliers(scene, kMostError, kLeastAngle);
+  drop_outliers(scene, kMostError, least_angle(priors));
 }
 
 // Of the poses that the pair may mean, the one from which adjusting explains most.
@@ -149,6 +149,16 @@ bool resect(Reconstruction& scene, int photo) {
 
 }  // namespace
 
+double least_angle(const std::vector<LensPrior>& priors) {
+  constexpr double kLeast = 0.01;
+  constexpr double kPixels = 12.5;
+  double out = kLeast;
+  for (const LensPrior& prior : priors) {
+    if (prior.focal > 0) out = std::min(out, kPixels / prior.focal);
+  }
+  return out;
+}
+
 int points_in(const Reconstruction& scene, int photo) {
   int count = 0;
   for (const Track& track : scene.tracks) {
@@ -211,7 +221,7 @@ void place_more(Reconstruction& scene,
                 const FirstPair& begun,
                 size_t most,
                 const Progress& progress) {
-  triangulate(scene, kMostError, kLeastAngle);
+  triangulate(scene, kMostError, least_angle(priors));
   std::vector<char> has_failed(scene.poses.size(), 0);
   auto placed = static_cast<int>(
       std::count_if(scene.poses.begin(), scene.poses.end(), [](const auto& pose) { return pose; }));
@@ -229,7 +239,7 @@ void place_more(Reconstruction& scene,
       settle(scene, priors, {.first = begun.first, .second = begun.second, .progress = progress});
       unsettled = 0;
     } else {
-      triangulate(scene, kMostError, kLeastAngle);
+      triangulate(scene, kMostError, least_angle(priors));
     }
     if (points_in(scene, photo) < kFewestPoints) scene.poses[static_cast<size_t>(photo)].reset();
   }

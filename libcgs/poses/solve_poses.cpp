@@ -77,7 +77,7 @@ void adjust_focal(const std::vector<LensPrior>& priors,
                               .solve_focal = true,
                               .progress = progress};
   adjust_bundle(attempt.scene, priors, options);
-  drop_outliers(attempt.scene, kMostError, kLeastAngle);
+  drop_outliers(attempt.scene, kMostError, least_angle(priors));
   attempt.error = capped_error(attempt.scene);
 }
 
@@ -141,7 +141,7 @@ bool has_rival(const Attempt& best,
 
 // Placed at the focal length from which a part of the points is explained best.
 // \throws NumericalError if quite another one does nearly as well
-Attempt best_attempt(const std::vector<int>& lens_of,
+Attempt best_attempt(const std::vector<UnposedPhoto>& photos,
                      const std::vector<LensPrior>& priors,
                      const std::vector<PhotoPair>& pairs,
                      const std::vector<Track>& tracks,
@@ -149,14 +149,17 @@ Attempt best_attempt(const std::vector<int>& lens_of,
   constexpr size_t kTracks = 600;   // enough for few photographs
   constexpr size_t kPerPhoto = 50;  // of many
   Reconstruction start;
-  start.tracks = sample(tracks, std::max(kTracks, kPerPhoto * lens_of.size()));
-  start.lens_of = lens_of;
-  start.poses.resize(lens_of.size());
+  start.tracks = sample(tracks, std::max(kTracks, kPerPhoto * photos.size()));
+  for (const UnposedPhoto& photo : photos) {
+    start.lens_of.push_back(photo.lens);
+    start.turns.push_back(photo.turns);
+  }
+  start.poses.resize(photos.size());
   const bool is_known = std::all_of(
       priors.begin(), priors.end(), [](const LensPrior& prior) { return prior.focal > 0; });
   std::vector<Attempt> attempts(is_known ? 1 : kFocals.size());
   // A dozen photographs tell the focal length, and with whom to begin, as well as hundreds.
-  const size_t all = lens_of.size();
+  const size_t all = photos.size();
   const size_t enough = std::min(all, kAllCompared);
   SharedProgress tried(progress, attempts.size() + (enough < all ? 1 : 0));
   const Progress tell = [&](double) { tried.tell(); };
@@ -184,8 +187,8 @@ void polish_once(const std::vector<LensPrior>& priors,
                  double most_error,
                  Reconstruction& scene) {
   adjust_bundle(scene, priors, options);
-  drop_outliers(scene, most_error, kLeastAngle);
-  triangulate(scene, most_error, kLeastAngle);
+  drop_outliers(scene, most_error, least_angle(priors));
+  triangulate(scene, most_error, least_angle(priors));
 }
 
 // Goes on until nothing changes any more.
@@ -309,13 +312,10 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
                    const Matched& matched,
                    const Progress& progress) {
   const std::vector<LensPrior> priors = lens_priors(photos);
-  std::vector<int> lens_of;
-  lens_of.reserve(photos.size());
-  for (const UnposedPhoto& photo : photos) lens_of.push_back(photo.lens);
   refuse_turned_only(photos, priors, matched.pairs);
   constexpr double kPlaced = 0.6;  // of the time
   Attempt attempt =
-      best_attempt(lens_of, priors, matched.pairs, matched.tracks, part_of(progress, 0, kPlaced));
+      best_attempt(photos, priors, matched.pairs, matched.tracks, part_of(progress, 0, kPlaced));
   if (!attempt.begun) throw NumericalError(unexplained_matches(photos, matched.pairs));
   Reconstruction scene = std::move(attempt.scene);
   scene.tracks = photos.size() <= kAllCompared
@@ -331,11 +331,10 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
 
   PoseSolution out;
   for (size_t i = 0; i < photos.size(); ++i) {
-    const auto lens = static_cast<size_t>(lens_of[i]);
-    out.photos.push_back(scene.poses[i]
-                             ? solved_photo(photos[i], scene.lenses[lens], *scene.poses[i])
-                             : SolvedPhoto{});
-    out.photos.back().focal_sigma = kOptimism * sigmas[lens];
+    const Lens lens = scene.lens(static_cast<int>(i));
+    out.photos.push_back(scene.poses[i] ? solved_photo(photos[i], lens, *scene.poses[i])
+                                        : SolvedPhoto{});
+    out.photos.back().focal_sigma = kOptimism * sigmas[static_cast<size_t>(photos[i].lens)];
   }
   add_points(photos, scene, out);
   return out;

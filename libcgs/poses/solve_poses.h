@@ -58,7 +58,7 @@ struct PoseSolution {
 ///
 /// The result does not depend on the number of threads, and on the order of the photographs only
 /// by rounding and by the choice of world axes.
-/// \pre lens counts from 0; equal lens means equal size, focal and focal_sigma
+/// \pre lens counts from 0; equal lens means equal focal, focal_sigma and size but for turns
 /// \throws InvalidInput for fewer than two photographs; NumericalError where they cannot say: too
 ///         few matches (naming the pair), no parallax (the camera was only turned), focal length
 ///         not determined, matches that no cameras explain.

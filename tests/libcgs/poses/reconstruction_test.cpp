@@ -16,7 +16,7 @@ Reconstruction two_of_three() {
 }
 
 Observation observation(const Reconstruction& scene, int photo, const Eigen::Vector3d& point) {
-  const Lens& lens = scene.lens(photo);
+  const Lens lens = scene.lens(photo);
   const Eigen::Vector2d direction = (*scene.pose(photo) * point).hnormalized();
   return {photo, 0, through_lens(lens.focal, lens.k1, lens.centre, direction), true};
 }

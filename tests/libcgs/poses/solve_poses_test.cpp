@@ -127,6 +127,53 @@ TEST(SolvePoses, FindsDistortion) {
   EXPECT_LT(errors.focal, 0.01);
 }
 
+// The last photograph as if the camera had been held upright for it: turned by a quarter clockwise.
+UnposedPhoto turned_upright(UnposedPhoto photo) {
+  for (Eigen::Vector2d& at : photo.features.points) at = {photo.height - at.y(), at.x()};
+  std::swap(photo.width, photo.height);
+  photo.turns = 1;
+  return photo;
+}
+
+TEST(SolvePoses, UprightAndLyingPhotographsShareALens) {
+  PointScene scene = three_views();
+  for (Camera& camera : scene.cameras) camera.cx += 40;  // where an unturned lens has it
+  scene.k1 = -0.1;
+  std::vector<UnposedPhoto> photos = with_focal(unposed_photos(scene), kFocal, 0.05);
+  const PoseSolution lying = solve_poses(photos);
+  photos[2] = turned_upright(photos[2]);
+  const PoseSolution mixed = solve_poses(photos);
+  ASSERT_TRUE(lying.photos[2].is_placed);
+  ASSERT_TRUE(mixed.photos[2].is_placed);
+  const Camera& before = lying.photos[2].camera;
+  const Camera& after = mixed.photos[2].camera;
+  EXPECT_GT(before.cx - 600, 15);
+  EXPECT_NEAR(after.cx, 900 - before.cy, 0.05);
+  EXPECT_NEAR(after.cy, before.cx, 0.05);
+  EXPECT_NEAR(after.fx, before.fx, 0.05);
+  EXPECT_NEAR(mixed.photos[2].k1, lying.photos[2].k1, 1e-4);
+  EXPECT_EQ(after.fx, mixed.photos[0].camera.fx);
+  const Eigen::Matrix3d quarter = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).matrix();
+  const Eigen::Matrix3d expected = before.world_from_cam.rotation() * quarter.transpose();
+  EXPECT_LT((after.world_from_cam.rotation() - expected).norm(), 1e-3);
+}
+
+// Houses far away: the rays to them meet under half a degree, which through a
+// long lens are 50 pixels.
+TEST(SolvePoses, FindsCamerasBehindALongLens) {
+  constexpr double kLong = 6000;
+  PointScene scene;
+  for (const double x : {-0.4, 0.0, 0.42}) {
+    scene.cameras.push_back(test::looking_at({x, 0.1 * x, -100}, {0, 0, 0}, 1200, 900, kLong));
+  }
+  scene.points = test::scattered_points(500, {8, 6, 15});
+  const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kLong, 0));
+  const auto errors = pose_errors(cameras_of(solution), scene.cameras);
+  EXPECT_LT(errors.rotation, 0.02);
+  EXPECT_LT(errors.direction, 3);
+  EXPECT_GT(solution.points.size(), 300u);
+}
+
 TEST(SolvePoses, PointsAreWhereTheyWere) {
   PointScene scene = three_views();
   scene.noise = 1e-6;
