@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/monitor/changes.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <random>
 
@@ -103,7 +106,9 @@ TEST(StandingOut, TellsNoVolumeOfWhatStandsFree) {
   const Changes changes = standing_out(sheet(post, 0.001F), sheet(flat, 0.001F));
   ASSERT_FALSE(changes.patches.empty());
   for (const ChangePatch& patch : changes.patches) {
-    if (patch.distance > std::sqrt(patch.area)) EXPECT_FALSE(patch.volume);
+    if (patch.distance > std::sqrt(patch.area)) {
+      EXPECT_FALSE(patch.volume);
+    }
   }
   const ChangeTotal total = total_of(changes.patches);
   EXPECT_LT(total.volume, 0.5 * 0.12 * 0.12);
