@@ -147,7 +147,7 @@ void draw_tile(const TileSplats& splats, std::array<int, 2> size, TileEnd& end, 
   uint32_t open = unfinished_windows(end.transmittance);
   size_t visited = 0;
   WindowList list;
-  list.pairs = has_sixteen_lanes();
+  list.pairs = splats.sixteen_lanes;
   list.depths = sums.has_depths;
   list.squares = sums.has_weight_squares;
   while (visited < splats.nearest_first.size() && open != 0) {
@@ -173,7 +173,7 @@ void differentiate_tile(const TileSplats& splats,
     records.moments[place] = {};
     if (channels.color_derivative) records.color[place] = {};
   }
-  const auto differentiate = has_sixteen_lanes() ? differentiate_wide : differentiate_with<Lanes8>;
+  const auto differentiate = splats.sixteen_lanes ? differentiate_wide : differentiate_with<Lanes8>;
   differentiate(splats, end, loss, channels, records);
 }
 

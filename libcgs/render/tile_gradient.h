@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "libcgs/core/lanes.h"
 #include "libcgs/render/tile_blending.h"
 
 namespace cgs {
@@ -32,6 +33,8 @@ struct TileSplats {
   std::span<const BandSplat> band;
   std::span<TileEntry> nearest_first;
   int first_column = 0;  ///< First pixel column of the tile.
+  /// Handles 16 pixels at once, which needs has_sixteen_lanes(), or else 8: the bits are the same.
+  bool sixteen_lanes = has_sixteen_lanes();
 };
 
 /// Where drawing a tile ended, for the way back.
