@@ -96,13 +96,13 @@ ReferencePlanes draw_reference(const std::vector<ReferenceGaussian>& gaussians,
       if (alpha < 1.0 / 255) continue;
       const double w = alpha * T;
       for (int c = 0; c < 3; ++c) out[size_t(c)][p] += w * s.color[c];
-      out[3][p] += w;
       out[4][p] += w * s.z;
       out[5][p] += w * s.z * s.z;
       out[6][p] += w * w;
       T *= 1 - alpha;
     }
     for (int c = 0; c < 3; ++c) out[size_t(c)][p] += T * background[c];
+    out[3][p] = 1 - T;  // the sum of w, which would round at every splat
   }
   return out;
 }

@@ -2,13 +2,16 @@
 #include "libcgs/render/training_rasterizer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <functional>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <random>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -148,15 +151,18 @@ double loss_of(const test::ReferencePlanes& planes_of_scene, TrainingBuffers& we
 struct Comparison {
   std::vector<unsigned> channels = {1, 2, 4, 8, 16, 32, 64, kEveryChannel};
   Camera camera = oblique_camera();
-  size_t every = 1;          // compares one derivative in so many
-  size_t most = size_t(-1);  // of the first so many
+  std::vector<size_t> entries = {};  // to compare; empty: all
   double step = 1e-6;
+  // What is drawn is linear in an opacity, but where a pixel is finished earlier or later it jumps:
+  // there, a small step hardly ever does that.
+  double opacity_step = 1e-6;
 };
 
 // Compares derivatives with central differences of the reference, for each set of channels.
-void expect_differences(const Gaussians& g,
-                        const TrainingRasterizerOptions& options,
-                        const Comparison& how = {}) {
+// Returns how many of each kind were compared.
+std::map<std::string, size_t> expect_differences(const Gaussians& g,
+                                                 const TrainingRasterizerOptions& options,
+                                                 const Comparison& how = {}) {
   TrainingRasterizer rasterizer(options);
   std::vector<TrainingBuffers> losses;
   std::vector<std::vector<Entry>> entries;
@@ -169,16 +175,23 @@ void expect_differences(const Gaussians& g,
   }
   const Eigen::Vector3d background = options.background.cast<double>();
   std::vector<std::vector<double>> truth(losses.size());
-  std::vector<size_t> compared;
-  for (size_t e = 0; e < std::min(how.most, entries[0].size()); e += how.every) {
+  std::vector<size_t> compared = how.entries;
+  if (compared.empty()) {
+    compared.resize(entries[0].size());
+    std::iota(compared.begin(), compared.end(), size_t{0});
+  }
+  std::map<std::string, size_t> kinds;
+  for (const size_t e : compared) {
+    const std::string kind = entries[0].at(e).kind;
+    const double step = kind == "opacity" ? how.opacity_step : how.step;
     auto scene = test::reference_gaussians(g);
-    entries[0][e].add(scene, how.step);
+    entries[0][e].add(scene, step);
     const auto plus = test::draw_reference(scene, how.camera, background);
-    entries[0][e].add(scene, -2 * how.step);
+    entries[0][e].add(scene, -2 * step);
     const auto minus = test::draw_reference(scene, how.camera, background);
-    compared.push_back(e);
+    ++kinds[kind];
     for (size_t l = 0; l < losses.size(); ++l) {
-      truth[l].push_back((loss_of(plus, losses[l]) - loss_of(minus, losses[l])) / (2 * how.step));
+      truth[l].push_back((loss_of(plus, losses[l]) - loss_of(minus, losses[l])) / (2 * step));
     }
   }
   for (size_t l = 0; l < losses.size(); ++l) {
@@ -194,6 +207,7 @@ void expect_differences(const Gaussians& g,
           << entry.kind << ", entry " << compared[k] << ", channels " << how.channels[l];
     }
   }
+  return kinds;
 }
 
 TEST(TrainingRasterizer, DifferentiatesBalls) {
@@ -284,6 +298,20 @@ TEST(TrainingRasterizer, DifferentiatesBallsThatCoverTheImage) {
       random_gaussians(oblique_camera(), spread, 6), {}, {.channels = {8, kEveryChannel}});
 }
 
+// An entry of each of the first `count` balls, one in `every`: x, y, radius and opacity in turn. A
+// difference in z would change the order of those at one depth.
+std::vector<size_t> entries_in_turn(size_t count, size_t every) {
+  constexpr size_t kOfBall = 5;
+  constexpr std::array<size_t, 4> kKinds = {0, 1, 3, 4};
+  std::vector<size_t> out;
+  for (size_t i = 0; i < count; i += every) {
+    out.push_back(kOfBall * i + kKinds.at(out.size() % kKinds.size()));
+  }
+  return out;
+}
+
+using KindCounts = std::map<std::string, size_t>;
+
 TEST(TrainingRasterizer, DifferentiatesManySplatsAtOneDepth) {
   const Camera camera{.width = 4, .height = 4, .fx = 4, .fy = 4, .cx = 2, .cy = 2};
   for (const float opacity : {0.006f, 0.012f, 0.1f}) {
@@ -295,9 +323,14 @@ TEST(TrainingRasterizer, DifferentiatesManySplatsAtOneDepth) {
       g.opacity.push_back(opacity);
       g.sh.push_back(Eigen::Vector3f::Constant(0.01f * float(i % 17)));
     }
-    // Entry 4 of each Gaussian is the opacity; differences in z would change the order.
-    expect_differences(
-        g, {}, {.channels = {1, 8, kEveryChannel}, .camera = camera, .every = 15, .step = 1e-3});
+    const KindCounts compared = expect_differences(g,
+                                                   {},
+                                                   {.channels = {1, 8, kEveryChannel},
+                                                    .camera = camera,
+                                                    .entries = entries_in_turn(1000, 3),
+                                                    .step = 1e-3,
+                                                    .opacity_step = 1e-7});
+    EXPECT_EQ(compared, (KindCounts{{"opacity", 83}, {"position", 168}, {"radius", 83}}));
   }
 }
 
@@ -312,9 +345,13 @@ TEST(TrainingRasterizer, DifferentiatesAHundredThousandSplatsAtOneDepth) {
     g.opacity.push_back(0.0045f);
     g.sh.push_back(Eigen::Vector3f::Constant(0.01f * float(i % 17)));
   }
-  const Comparison some = {
-      .channels = {kEveryChannel}, .camera = camera, .every = 15, .most = 3000, .step = 1e-3};
-  expect_differences(g, {}, some);
+  const Comparison some = {.channels = {kEveryChannel},
+                           .camera = camera,
+                           .entries = entries_in_turn(600, 30),
+                           .step = 1e-3,
+                           .opacity_step = 1e-7};
+  EXPECT_EQ(expect_differences(g, {}, some),
+            (KindCounts{{"opacity", 5}, {"position", 10}, {"radius", 5}}));
 }
 
 // Compares what is drawn with the reference of rasterize(), which knows the pixels that rounding
