@@ -7,7 +7,10 @@ set -euo pipefail
 program=$1
 source=$2
 shift 2
-filter=$(sed -nE 's/^TEST(_F|_P)?\((\w+),.*/\2.*:*\/\2.*/p' "$source" | sort -u | paste -sd :)
+# By both names: two sources of a program may have a suite of one name.
+filter=$(tr '\n' ' ' < "$source" | grep -oE '\bTEST(_F|_P)?\( *\w+, *\w+\)' |
+         sed -E 's/TEST(_F)?\( *(\w+), *(\w+)\)/\2.\3/; s/TEST_P\( *(\w+), *(\w+)\)/*\/\1.\2\/*/' |
+         paste -sd : || true)
 if [ -z "$filter" ]; then
   echo "$source: no test found" >&2
   exit 1
