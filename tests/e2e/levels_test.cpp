@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/images/image.h"
+#include "tests/support/largest.h"
 #include "tests/support/portal_capture.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/triangles.h"
@@ -81,7 +82,7 @@ double reach(const json& box, const Eigen::Vector3d& place) {
   const auto at = [&](size_t i) { return Eigen::Map<const Eigen::Vector3d>(&values[i]); };
   double out = 0;
   for (const size_t axis : {3, 6, 9}) {
-    out = std::max(out, std::abs((place - at(0)).dot(at(axis))) / at(axis).squaredNorm());
+    out = test::largest(out, std::abs((place - at(0)).dot(at(axis))) / at(axis).squaredNorm());
   }
   return out;
 }
@@ -96,7 +97,8 @@ void expect_placed(const Tile& tile, const test::Glb& glb) {
   double farthest = 0;
   for (const test::GlbPart& part : glb.parts) {
     for (const auto& p : part.values.at("POSITION")) {
-      farthest = std::max(farthest, reach(tile.object["boundingVolume"]["box"], in_tile(glb, p)));
+      farthest =
+          test::largest(farthest, reach(tile.object["boundingVolume"]["box"], in_tile(glb, p)));
       // The same place by what the file says of itself; its second axis is up.
       const Eigen::Vector3d in_world = test::in_world(glb, p);
       const Eigen::Vector3d expected(world(0, in_world), -world(2, in_world), world(1, in_world));

@@ -6,14 +6,11 @@
 #include <vector>
 
 #include "tests/e2e/extremes/cell.h"
+#include "tests/support/largest.h"
 
 namespace cgs::test {
 
 using Points = std::vector<Eigen::Vector3d>;
-
-inline double largest(double a, double b) {
-  return std::isnan(a) || std::isnan(b) ? NAN : std::max(a, b);
-}
 
 /// Largest distance between points in the world of a cell and plain points, in plain units.
 inline double largest_error(const Points& in_world, const Points& plain, const Cell& cell) {

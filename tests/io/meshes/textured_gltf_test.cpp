@@ -14,6 +14,7 @@
 #include "io/meshes/gltf.h"
 #include "libcgs/core/error.h"
 #include "tests/support/glb_file.h"
+#include "tests/support/largest.h"
 #include "tests/support/sample_mesh.h"
 #include "tests/support/temp_dir.h"
 #include "tests/support/textured_cube.h"
@@ -95,7 +96,7 @@ TEST(WriteTexturedGlb, TextureCoordinatesAreTheProjections) {
         const Eigen::Vector2d found =
             images[i].corner.cast<double>() +
             Eigen::Vector2d(t[0] * double(images[i].size.x()), t[1] * double(images[i].size.y()));
-        worst = std::max(worst, (found - expected.head<2>()).norm());
+        worst = test::largest(worst, (found - expected.head<2>()).norm());
       }
     }
     EXPECT_LE(worst, 0.1);

@@ -9,6 +9,7 @@
 
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
+#include "tests/support/largest.h"
 #include "tests/support/reference_conv_decoder.h"
 
 namespace cgs::coherent_gaussians_test {
@@ -133,6 +134,7 @@ void expect_finite_differences(CoherentGaussians& model,
                                ParameterBlock& block,
                                const LinearLoss& loss) {
   const std::vector<float> gradient = block.gradient;
+  ASSERT_EQ(gradient.size(), block.value.size());
   double worst = 0;
   double largest = 0;
   for (size_t i = 0; i < block.value.size(); i += 1 + block.value.size() / 97) {
@@ -145,8 +147,9 @@ void expect_finite_differences(CoherentGaussians& model,
     model.decode();
     const double below = loss(model);
     block.value[i] = before;
-    worst = std::max(worst, std::abs((above - below) / (2 * double(kStep)) - double(gradient[i])));
-    largest = std::max(largest, std::abs(double(gradient[i])));
+    const double slope = (above - below) / (2 * double(kStep));
+    worst = test::largest(worst, std::abs(slope - double(gradient[i])));
+    largest = test::largest(largest, std::abs(double(gradient[i])));
   }
   model.decode();
   EXPECT_GT(largest, 0.01);
@@ -160,9 +163,13 @@ void expect_gradients(bool free) {
   model.decode();
   const LinearLoss loss(model, free);
   model.add_gradients(loss.weights, loss.depth);
+  size_t compared = 0;
   for (ParameterBlock& block : model.parameters) {
-    if (!block.value.empty()) expect_finite_differences(model, block, loss);
+    if (block.value.empty()) continue;
+    expect_finite_differences(model, block, loss);
+    ++compared;
   }
+  EXPECT_EQ(compared, free ? 6u : 4u);  // depths, opacities and shapes of two views
 }
 
 void expect_initial_gaussians(const CoherenceOptions& options) {
@@ -363,6 +370,7 @@ void expect_gradients_of_networks(bool of_depth) {
   const std::vector<double> opacity = values(1);
   EXPECT_NEAR(loss(model), chain(loss, depth, opacity), 1e-3);
   const std::vector<float>& gradient = model.parameters[of_depth ? 0 : 1].gradient;
+  ASSERT_EQ(gradient.size(), (of_depth ? depth : opacity).size());
   double worst = 0;
   double largest = 0;
   constexpr double kStep = 1e-6;
@@ -373,8 +381,8 @@ void expect_gradients_of_networks(bool of_depth) {
       return of_depth ? chain(loss, changed, opacity) : chain(loss, depth, changed);
     };
     const double slope = (at(kStep) - at(-kStep)) / (2 * kStep);
-    worst = std::max(worst, std::abs(slope - double(gradient[i])));
-    largest = std::max(largest, std::abs(slope));
+    worst = test::largest(worst, std::abs(slope - double(gradient[i])));
+    largest = test::largest(largest, std::abs(slope));
   }
   EXPECT_GT(largest, 0.01);
   EXPECT_LT(worst, 1e-4 * largest);

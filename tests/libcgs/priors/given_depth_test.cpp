@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/largest.h"
+
 namespace cgs::given_depth_test {
 namespace {
 
@@ -59,10 +61,12 @@ struct Example {
   }
   double largest_error(const GivenDepth& given) const {
     double worst = 0;
+    EXPECT_EQ(given.views.size(), scene.views.size());
     for (const FittedDepth& view : given.views) {
+      if (view.depth.width != kWidth || view.depth.height != kHeight) return kNaN;
       for (int y = 0; y < kHeight; ++y) {
         for (int x = 0; x < kWidth; ++x) {
-          worst = std::max(worst, std::abs(double(view.depth(x, y)) / truth(x, y) - 1));
+          worst = test::largest(worst, std::abs(double(view.depth(x, y)) / truth(x, y) - 1));
         }
       }
     }
