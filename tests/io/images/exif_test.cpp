@@ -4,13 +4,14 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
+#include <filesystem>
 
 #include <gtest/gtest.h>
 
 #include "tests/support/exif_segment.h"
 #include "tests/support/heif_file.h"
 #include "tests/support/scene_files.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs::exif_test {
@@ -210,10 +211,9 @@ TEST_F(ExifFile, StandsEveryCutAndChangedByte) {
 }
 
 TEST(Exif, OfACameraIsNearWhatCalibrationFound) {
-  const char* const data = std::getenv("CGS_SHARED_DATA");
-  if (data == nullptr) GTEST_SKIP() << "CGS_SHARED_DATA is not set";
-  const std::filesystem::path file =
-      std::filesystem::path(data) / "heritage_ethiopian_head/images/DSC_0027.JPG";
+  const std::filesystem::path data = test::shared_data();
+  if (data.empty()) GTEST_SKIP() << test::kNoSharedData;
+  const std::filesystem::path file = data / "heritage_ethiopian_head/images/DSC_0027.JPG";
   const LensHint lens = lens_hint(file, image_size(file));
   constexpr double kCalibrated = 7543.6;  // poses_bounds.npy
   EXPECT_NEAR(std::log(lens.focal / kCalibrated), 0, 2 * lens.sigma);

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/scene_files.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs::pfm_test {
@@ -69,10 +69,10 @@ TEST_F(ReadPfm, RefusesWhatIsNoGreyPfm) {
 }
 
 TEST_F(ReadPfm, ReadsMiddleburysDisparities) {
-  const char* const data = std::getenv("CGS_SHARED_DATA");
-  if (data == nullptr) GTEST_SKIP() << "CGS_SHARED_DATA is not set";
+  const std::filesystem::path data = test::shared_data();
+  if (data.empty()) GTEST_SKIP() << test::kNoSharedData;
   for (const auto& entry :
-       std::filesystem::recursive_directory_iterator(std::string(data) + "/middlebury2014Q")) {
+       std::filesystem::recursive_directory_iterator(data / "middlebury2014Q")) {
     if (entry.path().extension() != ".pfm") continue;
     const Raster<float> read = read_pfm(entry.path());
     // Where the disparity is known, a pixel stays in the picture when moved by it.

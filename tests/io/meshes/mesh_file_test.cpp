@@ -2,13 +2,14 @@
 #include "io/meshes/mesh_file.h"
 
 #include <cmath>
-#include <cstdlib>
+#include <filesystem>
 
 #include <gtest/gtest.h>
 
 #include "io/meshes/mesh_ply.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
+#include "tests/support/shared_data.h"
 
 namespace cgs::mesh_file_test {
 namespace {
@@ -87,13 +88,12 @@ TEST(ReadMeshFile, WarnsOfFacesWithoutArea) {
 
 // Other people's damaged files: something comes back, or one of our errors.
 TEST(ReadMeshFile, SurvivesFilesOfOthers) {
-  const char* const data = std::getenv("CGS_SHARED_DATA");
-  if (data == nullptr) GTEST_SKIP() << "CGS_SHARED_DATA is not set";
+  const std::filesystem::path data = test::shared_data();
+  if (data.empty()) GTEST_SKIP() << test::kNoSharedData;
   int read = 0;
   int refused = 0;
   for (const char* folder : {"malformed", "meshes"}) {
-    for (const auto& entry :
-         std::filesystem::recursive_directory_iterator(std::filesystem::path(data) / folder)) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(data / folder)) {
       if (!entry.is_regular_file() || !is_mesh_name(entry.path())) continue;
       try {
         const MeasurableFile file = read_mesh_file(entry.path());

@@ -3,12 +3,14 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 
 #include <gtest/gtest.h>
 
 #include "io/scenes/photographs.h"
 #include "io/scenes/scene_reader.h"
 #include "tests/support/scene_files.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs::rgbd_frames_test {
@@ -190,11 +192,11 @@ double median_off(const View& from, const View& to) {
 }
 
 TEST_F(RgbdFrames, FramesOfRealSensorsAgree) {
-  const char* const data = std::getenv("CGS_SHARED_DATA");
-  if (data == nullptr) GTEST_SKIP() << "CGS_SHARED_DATA names no folder of shared data";
+  const std::filesystem::path data = test::shared_data();
+  if (data.empty()) GTEST_SKIP() << test::kNoSharedData;
   SceneOptions options;
   options.views = "0,1";
-  Scene scene = read_scene(std::filesystem::path(data) / "sevenscenes_tsdf50", options);
+  Scene scene = read_scene(data / "sevenscenes_tsdf50", options);
   EXPECT_EQ(scene.views.size(), 50u);
   load_images(scene, scene.input);
   EXPECT_LT(median_off(scene.views[0], scene.views[1]), 0.015);

@@ -2,11 +2,12 @@
 #include "io/scenes/scene_reader.h"
 
 #include <cmath>
-#include <cstdlib>
+#include <filesystem>
 
 #include <gtest/gtest.h>
 
 #include "tests/support/scene_files.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs::scene_reader_test {
@@ -353,9 +354,9 @@ TEST_F(ReadScene, RefusesImagesThatAreCutOrChanged) {
 }
 
 TEST(ReadSceneOnRealData, FindsFernWithItsSparsePoints) {
-  const char* const data = std::getenv("CGS_SHARED_DATA");
-  if (data == nullptr) GTEST_SKIP() << "CGS_SHARED_DATA is not set";
-  Scene scene = read_scene(std::filesystem::path(data) / "llff_fern");
+  const std::filesystem::path data = test::shared_data();
+  if (data.empty()) GTEST_SKIP() << test::kNoSharedData;
+  Scene scene = read_scene(data / "llff_fern");
   EXPECT_EQ(scene.input, (Indices{1, 10, 19}));
   ASSERT_GT(scene.points.size(), 10'000u);
   load_images(scene, {0, 1});

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +12,7 @@
 #include "io/splats/spz.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_splats.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/sog_file.h"
 #include "tests/support/temp_dir.h"
 
@@ -93,9 +95,9 @@ TEST(SplatReader, TellsSizesOfSogByItsMeta) {
 class RealSplats : public testing::Test {
  protected:
   void SetUp() override {
-    const char* const data = std::getenv("CGS_SHARED_DATA");
-    if (data == nullptr) GTEST_SKIP() << "CGS_SHARED_DATA is not set";
-    folder_ = std::filesystem::path(data) / "splats";
+    const std::filesystem::path data = test::shared_data();
+    if (data.empty()) GTEST_SKIP() << test::kNoSharedData;
+    folder_ = data / "splats";
   }
   GaussianFile read(const std::string& name) const { return read_splats(folder_ / name, Frame{}); }
   void expect_box(const GaussianFile& file,
