@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole chain on the portal capture, measured against its truth. CTest runs every test in a
-// process of its own, so the run is kept in the build folder and resumed.
+// The whole chain on the portal capture, measured against its truth.
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -19,8 +18,7 @@ using test::run_cgs;
 
 const std::filesystem::path kCapture = test::portal_capture(1);
 const std::filesystem::path kSmallCapture = test::portal_capture(3);
-const std::filesystem::path kRun = std::filesystem::path(CGS_TEST_FOLDER) / "run";
-const std::filesystem::path kSmallRun = std::filesystem::path(CGS_TEST_FOLDER) / "run_small";
+const std::filesystem::path kRun = std::filesystem::path(CGS_TEST_FOLDER) / "run";  // stays there
 
 std::string run_arguments(const std::filesystem::path& capture, const std::filesystem::path& out) {
   return "run " + capture.string() + " --views view_01,view_02,view_03 --assume-unit m -q -o " +
@@ -78,16 +76,17 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
 }
 
 TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
-  std::filesystem::remove_all(kSmallRun);
-  const std::string arguments = run_arguments(kSmallCapture, kSmallRun) +
-                                " --voxel-size 8cm --lods 2" + kShort;  // for other_readers.sh, too
+  const test::TempDir dir;
+  const std::filesystem::path out = dir / "out";
+  const std::string arguments =
+      run_arguments(kSmallCapture, out) + " --voxel-size 8cm --lods 2" + kShort;
   ASSERT_EQ(run_cgs(arguments).exit_code, 0);
-  const auto splats_written = std::filesystem::last_write_time(kSmallRun / "model/gaussians.ply");
-  const auto glb = test::read_bytes(kSmallRun / "web/asset.glb");
-  std::filesystem::remove(kSmallRun / "web/asset.glb");
+  const auto splats_written = std::filesystem::last_write_time(out / "model/gaussians.ply");
+  const auto glb = test::read_bytes(out / "web/asset.glb");
+  std::filesystem::remove(out / "web/asset.glb");
   ASSERT_EQ(run_cgs(arguments).exit_code, 0);
-  EXPECT_TRUE(test::read_bytes(kSmallRun / "web/asset.glb") == glb);
-  EXPECT_EQ(std::filesystem::last_write_time(kSmallRun / "model/gaussians.ply"), splats_written);
+  EXPECT_TRUE(test::read_bytes(out / "web/asset.glb") == glb);
+  EXPECT_EQ(std::filesystem::last_write_time(out / "model/gaussians.ply"), splats_written);
 }
 
 TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
