@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/train/training_options.h"
 
+#include <map>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
@@ -8,20 +15,131 @@
 namespace cgs::training_options_test {
 namespace {
 
+using Member = std::variant<int TrainingOptions::*,
+                            double TrainingOptions::*,
+                            int CoherenceOptions::*,
+                            float CoherenceOptions::*>;
+
+// All fields that are numbers, by their members.
+const std::vector<std::pair<std::string, Member>>& numbers() {
+  static const std::vector<std::pair<std::string, Member>> kNumbers = {
+      {"steps", &TrainingOptions::steps},
+      {"coarse_until", &TrainingOptions::coarse_until},
+      {"free_from", &TrainingOptions::free_from},
+      {"sharp_from", &TrainingOptions::sharp_from},
+      {"depth_rate", &TrainingOptions::depth_rate},
+      {"opacity_rate", &TrainingOptions::opacity_rate},
+      {"color_rate", &TrainingOptions::color_rate},
+      {"shape_rate", &TrainingOptions::shape_rate},
+      {"final_rate", &TrainingOptions::final_rate},
+      {"conv_depth_rate", &TrainingOptions::conv_depth_rate},
+      {"conv_opacity_rate", &TrainingOptions::conv_opacity_rate},
+      {"conv_rise", &TrainingOptions::conv_rise},
+      {"l1_weight", &TrainingOptions::l1_weight},
+      {"ssim_weight", &TrainingOptions::ssim_weight},
+      {"tv_weight", &TrainingOptions::tv_weight},
+      {"masked_tv_weight", &TrainingOptions::masked_tv_weight},
+      {"tv_to_layers", &TrainingOptions::tv_to_layers},
+      {"flow_weight", &TrainingOptions::flow_weight},
+      {"prior_weight", &TrainingOptions::prior_weight},
+      {"spread_weight", &TrainingOptions::spread_weight},
+      {"emptiness_weight", &TrainingOptions::emptiness_weight},
+      {"near_opacity_weight", &TrainingOptions::near_opacity_weight},
+      {"edge_smooth_weight", &TrainingOptions::edge_smooth_weight},
+      {"seen_through_weight", &TrainingOptions::seen_through_weight},
+      {"order_weight", &TrainingOptions::order_weight},
+      {"patch_depth_weight", &TrainingOptions::patch_depth_weight},
+      {"virtual_weight", &TrainingOptions::virtual_weight},
+      {"virtual_tv_weight", &TrainingOptions::virtual_tv_weight},
+      {"average_decay", &TrainingOptions::average_decay},
+      {"depth_bending", &TrainingOptions::depth_bending},
+      {"opacity_bending", &TrainingOptions::opacity_bending},
+      {"opacity_prior", &TrainingOptions::opacity_prior},
+      {"color_prior", &TrainingOptions::color_prior},
+      {"l1_levels", &TrainingOptions::l1_levels},
+      {"dropout", &TrainingOptions::dropout},
+      {"dropout_block", &TrainingOptions::dropout_block},
+      {"conv_depth_width", &CoherenceOptions::conv_depth_width},
+      {"conv_opacity_width", &CoherenceOptions::conv_opacity_width},
+      {"conv_depth_gain", &CoherenceOptions::conv_depth_gain},
+      {"conv_opacity_gain", &CoherenceOptions::conv_opacity_gain},
+      {"max_depth_change", &CoherenceOptions::max_depth_change},
+      {"max_logit_change", &CoherenceOptions::max_logit_change},
+      {"radius_factor", &CoherenceOptions::radius_factor},
+      {"min_radius", &CoherenceOptions::min_radius},
+      {"max_radius", &CoherenceOptions::max_radius},
+      {"opacity", &CoherenceOptions::opacity},
+      {"sh_degree", &CoherenceOptions::sh_degree},
+      {"layers_per_ray", &CoherenceOptions::layers_per_ray}};
+  return kNumbers;
+}
+
+template <typename T>
+T& at(TrainingOptions& options, T TrainingOptions::*member) {
+  return options.*member;
+}
+template <typename T>
+T& at(TrainingOptions& options, T CoherenceOptions::*member) {
+  return options.coherence.*member;
+}
+
+// No two are alike, and none is what a field is by default; those of fractions are no short
+// decimals.
+void set_each(TrainingOptions& options) {
+  int next = 1000;
+  for (const auto& [name, member] : numbers()) {
+    ++next;
+    std::visit(
+        [&](auto which) {
+          auto& value = at(options, which);
+          value = static_cast<std::decay_t<decltype(value)>>(next + 1.0 / 3);
+        },
+        member);
+  }
+  options.method = SplatMethod::Classical;
+  options.coherence.decoder = ResidualDecoder::Conv;
+  options.coherence.depth_spacing = {40, 10};
+  options.coherence.opacity_spacing = {30, 20, 5};
+}
+
 TEST(TrainingOptions, EveryFieldSurvivesPrintingAndReading) {
   TrainingOptions options;
-  options.steps = 17;
-  options.depth_rate = 0.1 + 0.2;
-  options.coherence.max_depth_change = 0.7f;
-  options.coherence.depth_spacing = {40, 10};
-  options.coherence.decoder = ResidualDecoder::Conv;
+  set_each(options);
   TrainingOptions copy;
   for (const auto& [name, value] : training_fields(options)) {
     set_training_field(copy, name, value);
   }
   EXPECT_EQ(training_fields(copy), training_fields(options));
-  EXPECT_EQ(copy.depth_rate, options.depth_rate);
+  for (const auto& [name, member] : numbers()) {
+    std::visit([&](auto which) { EXPECT_EQ(at(copy, which), at(options, which)) << name; }, member);
+  }
+  EXPECT_EQ(copy.method, options.method);
+  EXPECT_EQ(copy.coherence.decoder, options.coherence.decoder);
   EXPECT_EQ(copy.coherence.depth_spacing, options.coherence.depth_spacing);
+  EXPECT_EQ(copy.coherence.opacity_spacing, options.coherence.opacity_spacing);
+}
+
+TEST(TrainingOptions, EveryFieldIsCalledByTheNameOfItsMember) {
+  TrainingOptions options;
+  set_each(options);
+  const auto printed = training_fields(options);
+  std::map<std::string, std::string> text(printed.begin(), printed.end());
+  EXPECT_EQ(text.size(), printed.size()) << "a name comes twice";
+  for (const auto& [name, member] : numbers()) {
+    ASSERT_EQ(text.count(name), 1u) << name;
+    std::visit(
+        [&](auto which) {
+          const auto value = at(options, which);
+          EXPECT_EQ(static_cast<decltype(value)>(std::stod(text[name])), value) << name;
+        },
+        member);
+    text.erase(name);
+  }
+  EXPECT_EQ(text,
+            (std::map<std::string, std::string>{{"method", "classical"},
+                                                {"decoder", "conv"},
+                                                {"depth_spacing", "40,10"},
+                                                {"opacity_spacing", "30,20,5"}}));
 }
 
 TEST(TrainingOptions, RefuseUnknownFieldsAndBadValues) {
