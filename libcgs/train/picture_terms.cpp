@@ -28,12 +28,15 @@ LuminancePlanes luminance_planes(const ColorPlanes& color) {
   return out;
 }
 
-// From derivatives with respect to the three copies of the luminance to those by colours.
-void chain(const LuminancePlanes& luminance, ColorPlanes& gradient) {
-  if (gradient[0].empty()) return;  // no loss has a weight
+// Adds derivatives by colours, from those with respect to the three copies of the luminance.
+void chain(const LuminancePlanes& luminance, const ColorPlanes& by_copy, ColorPlanes& gradient) {
+  if (by_copy[0].empty()) return;  // no loss has a weight
+  for (Raster<float>& plane : gradient) {
+    if (plane.empty()) plane = Raster<float>(by_copy[0].width, by_copy[0].height, 0);
+  }
   tbb::parallel_for(size_t(0), luminance.derivative.data.size(), [&](size_t i) {
-    const float sum = gradient[0].data[i] + gradient[1].data[i] + gradient[2].data[i];
-    for (int c = 0; c < 3; ++c) gradient[c].data[i] = sum * luminance.derivative.data[i][c];
+    const float sum = by_copy[0].data[i] + by_copy[1].data[i] + by_copy[2].data[i];
+    for (int c = 0; c < 3; ++c) gradient[c].data[i] += sum * luminance.derivative.data[i][c];
   });
 }
 
@@ -62,11 +65,13 @@ void add_picture_terms(const TrainingBuffers& rendered,
   LuminancePlanes luminance;
   if (view.is_grey) luminance = luminance_planes(rendered.color);
   const ColorPlanes& shown = view.is_grey ? luminance.planes : rendered.color;
+  ColorPlanes by_copy;
+  ColorPlanes& by_shown = view.is_grey ? by_copy : loss.color;
   report.l1 += multi_scale_l1(
-      shown, view.photograph, use, options.l1_levels, share * options.l1_weight, loss.color);
-  report.ssim += structural_dissimilarity(
-      shown, view.photograph, use, share * options.ssim_weight, loss.color);
-  if (view.is_grey) chain(luminance, loss.color);
+      shown, view.photograph, use, options.l1_levels, share * options.l1_weight, by_shown);
+  report.ssim +=
+      structural_dissimilarity(shown, view.photograph, use, share * options.ssim_weight, by_shown);
+  if (view.is_grey) chain(luminance, by_copy, loss.color);
   const double gone_over = options.tv_to_layers * time * options.tv_weight;
   report.tv +=
       total_variation(rendered, unit, nullptr, share * (options.tv_weight - gone_over), loss);
