@@ -104,12 +104,13 @@ TEST(StandingOut, TellsNoVolumeOfWhatStandsFree) {
     return std::max(std::abs(x), std::abs(y)) < 0.06 ? 0.5 : 0.0;
   };
   const Changes changes = standing_out(sheet(post, 0.001F), sheet(flat, 0.001F));
-  ASSERT_FALSE(changes.patches.empty());
+  size_t free = 0;
   for (const ChangePatch& patch : changes.patches) {
-    if (patch.distance > std::sqrt(patch.area)) {
-      EXPECT_FALSE(patch.volume);
-    }
+    if (patch.distance <= std::sqrt(patch.area)) continue;
+    ++free;
+    EXPECT_FALSE(patch.volume);
   }
+  EXPECT_GT(free, 0U);
   const ChangeTotal total = total_of(changes.patches);
   EXPECT_LT(total.volume, 0.5 * 0.12 * 0.12);
 }
