@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <map>
 #include <set>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -26,10 +29,36 @@ using test::TempDir;
 
 constexpr double kMetresPerFoot = 0.3048;
 
-std::string run_arguments(const TempDir& dir, const std::string& more) {
-  return "run " + (dir / "capture").string() +
+std::string run_arguments(const fs::path& capture, const TempDir& dir, const std::string& more) {
+  return "run " + capture.string() +
          " --views view_01,view_02,view_03 --assume-unit ft --set steps=0 -q -o " +
          (dir / "out").string() + " " + more;
+}
+std::string run_arguments(const TempDir& dir, const std::string& more) {
+  return run_arguments(dir / "capture", dir, more);
+}
+
+/// A run with levels, for the tests that change nothing in it.
+struct LevelsRun {
+  TempDir dir;
+  test::ProgramResult result;
+
+  LevelsRun() {
+    test::copy_portal_capture(dir / "capture", 3);
+    result = run_cgs(run_arguments(dir, "--lods 2 --json --voxel-size 0.08"));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  /// Arguments of one that goes on from a copy of it in another folder.
+  std::string arguments_from_copy(const TempDir& other, const std::string& more) const {
+    fs::copy(dir / "out", other / "out", fs::copy_options::recursive);
+    return run_arguments(dir / "capture", other, "-w --voxel-size 0.08 " + more);
+  }
+};
+
+const LevelsRun& levels_run() {
+  static const LevelsRun kRun;
+  return kRun;
 }
 
 json parsed(const fs::path& path) { return json::parse(test::read_bytes(path)); }
@@ -163,11 +192,7 @@ std::vector<Eigen::Vector3d> places_of_splats(const fs::path& path) {
 // fused surface; a shift of one file against the other, as there once was, is many voxels.
 TEST(Asset, HasTheSplatsOnItsSurface) {
   constexpr double kVoxel = 0.08;  // [feet]
-  const TempDir dir;
-  test::copy_portal_capture(dir / "capture", 3);
-  const auto median_distance = [&](const std::string& more) {
-    const auto run = run_cgs(run_arguments(dir, "--voxel-size 0.08 " + more));
-    EXPECT_EQ(run.exit_code, 0) << run.err;
+  const auto median_distance = [](const TempDir& dir) {
     const test::Glb glb = test::parse_glb(test::read_bytes(dir / "out/web/asset.glb"));
     std::vector<test::Triangle> surface;
     for (const test::GlbPart& part : glb.parts) {
@@ -191,16 +216,16 @@ TEST(Asset, HasTheSplatsOnItsSurface) {
         distances.begin(), distances.begin() + long(distances.size() / 2), distances.end());
     return distances[distances.size() / 2];
   };
-  EXPECT_LT(median_distance(""), 0.5 * kVoxel * kMetresPerFoot);
-  EXPECT_LT(median_distance("-w --local-origin"), 0.5 * kVoxel * kMetresPerFoot);
+  EXPECT_LT(median_distance(levels_run().dir), 0.5 * kVoxel * kMetresPerFoot);
+  const TempDir local;
+  const auto run = run_cgs(levels_run().arguments_from_copy(local, "--local-origin"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_LT(median_distance(local), 0.5 * kVoxel * kMetresPerFoot);
 }
 
 TEST(Asset, LeavesOutFacesThatHoldColoursAndStaysNear) {
-  const TempDir dir;
-  test::copy_portal_capture(dir / "capture", 3);
-  const auto run = run_cgs(run_arguments(dir, "--json --voxel-size 0.08"));
-  ASSERT_EQ(run.exit_code, 0) << run.err;
-  const json report = json::parse(run.out);
+  ASSERT_EQ(levels_run().result.exit_code, 0);
+  const json report = json::parse(levels_run().result.out);
   const json& mesh = report["mesh"];
   const json& asset = report["web"]["asset.glb"];
   EXPECT_LT(asset["faces"], 0.8 * mesh["certificate"]["faces"].get<double>());
@@ -213,8 +238,7 @@ TEST(Asset, LeavesOutFacesThatHoldColoursAndStaysNear) {
 TEST(Asset, HoldsOnePictureIfAskedFor) {
   constexpr double kTexel = 0.1;  // [feet]
   const TempDir dir;
-  test::copy_portal_capture(dir / "capture", 3);
-  const auto run = run_cgs(run_arguments(dir, "--json --voxel-size 0.08 --texture atlas=0.1"));
+  const auto run = run_cgs(levels_run().arguments_from_copy(dir, "--json --texture atlas=0.1"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const json atlas = json::parse(run.out)["web"]["texture"]["atlas"];
   EXPECT_NEAR(atlas["texel"].get<double>(), kTexel, 1e-9);
@@ -227,16 +251,16 @@ TEST(Asset, HoldsOnePictureIfAskedFor) {
   EXPECT_TRUE(std::any_of(glb.parts.begin(), glb.parts.end(), [](const test::GlbPart& part) {
     return part.material == "observed atlas";
   }));
-  const auto refused = run_cgs(run_arguments(dir, "-w --texture mural"));
+  const auto refused =
+      run_cgs(run_arguments(levels_run().dir / "capture", dir, "-w --texture mural"));
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_NE(refused.err.find("--texture mural: allowed are photographs, atlas"), std::string::npos)
       << refused.err;
 }
 
 TEST(Levels, AreSmallerAndAsFarOffAsTheySay) {
-  const TempDir dir;
-  test::copy_portal_capture(dir / "capture", 3);
-  const auto run = run_cgs(run_arguments(dir, "--lods 2 --json --voxel-size 0.08"));
+  const TempDir& dir = levels_run().dir;
+  const test::ProgramResult& run = levels_run().result;
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const json levels = parsed(dir / "out/run.json")["stages"]["web"]["result"]["levels"];
   ASSERT_EQ(levels.size(), 2u);
