@@ -18,6 +18,7 @@ using test::run_cgs;
 
 const std::filesystem::path kCapture = test::portal_capture(1);
 const std::filesystem::path kSmallCapture = test::portal_capture(3);
+const std::filesystem::path kTinyCapture = test::portal_capture(6);
 const std::filesystem::path kRun = std::filesystem::path(CGS_TEST_FOLDER) / "run";  // stays there
 
 std::string run_arguments(const std::filesystem::path& capture, const std::filesystem::path& out) {
@@ -79,7 +80,7 @@ TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
   const test::TempDir dir;
   const std::filesystem::path out = dir / "out";
   const std::string arguments =
-      run_arguments(kSmallCapture, out) + " --voxel-size 8cm --lods 2" + kShort;
+      run_arguments(kTinyCapture, out) + " --voxel-size 8cm --lods 2" + kShort;
   ASSERT_EQ(run_cgs(arguments).exit_code, 0);
   const auto splats_written = std::filesystem::last_write_time(out / "model/gaussians.ply");
   const auto glb = test::read_bytes(out / "web/asset.glb");
@@ -91,10 +92,8 @@ TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
 
 TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
   const test::TempDir dir;
-  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "1") + kShort + " --threads 1").exit_code,
-            0);
-  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "3") + kShort + " --threads 3").exit_code,
-            0);
+  ASSERT_EQ(run_cgs(run_arguments(kTinyCapture, dir / "1") + kShort + " --threads 1").exit_code, 0);
+  ASSERT_EQ(run_cgs(run_arguments(kTinyCapture, dir / "3") + kShort + " --threads 3").exit_code, 0);
   for (const auto* file : {"model/gaussians.ply",
                            "views/view_04.exr",
                            "volume.vdb",
@@ -108,7 +107,7 @@ TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
 
 TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
   const test::TempDir dir;
-  const auto result = run_cgs("run " + kSmallCapture.string() + " --views 0,1,2 --json -o " +
+  const auto result = run_cgs("run " + kTinyCapture.string() + " --views 0,1,2 --json -o " +
                               (dir / "out").string() + kShort);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
@@ -116,8 +115,8 @@ TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
   EXPECT_NE(result.err.find("--assume-unit"), std::string::npos);
   EXPECT_EQ(ordered_json::parse(result.out)["units"], "unknown");
 
-  const std::string again = "run " + kSmallCapture.string() + " --views 0,1,2 -q -w -o " +
-                            (dir / "out").string() + kShort;
+  const std::string again =
+      "run " + kTinyCapture.string() + " --views 0,1,2 -q -w -o " + (dir / "out").string() + kShort;
   ASSERT_EQ(run_cgs(again + " --assume-unit m").exit_code, 0);
   EXPECT_TRUE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
   const auto model_written = std::filesystem::last_write_time(dir / "out/model/gaussians.ply");
