@@ -161,10 +161,12 @@ ChangeTotal total_of(const std::vector<ChangePatch>& patches) {
   return out;
 }
 
-Changes standing_out(const MeasurableMesh& surface, const MeasurableMesh& other) {
+Changes standing_out(const MeasurableMesh& surface,
+                     const MeasurableMesh& other,
+                     const M3c2Request& request) {
   constexpr double kLeastCylinders = 3;
   Changes out;
-  out.found = compare_m3c2(M3c2Request(), surface, other);
+  out.found = compare_m3c2(request, surface, other);
   const std::vector<M3c2Place>& places = out.found.places;
   out.noise = noise_of(places);
   const auto comparable = std::count_if(places.begin(), places.end(), [](const M3c2Place& place) {

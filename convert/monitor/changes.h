@@ -45,7 +45,10 @@ ChangeTotal total_of(const std::vector<ChangePatch>& patches);
 /// than sigma and roughness say: by their median. Nor do they count where the nearest place of the
 /// other surface is within that level. A patch is what such places join, with one among them of
 /// twice the level, and no smaller than three of M3C2's cylinders.
+/// \param request  what else is uncertain, such as the scale of one against the other's
 /// \throws Error as compare_m3c2()
-Changes standing_out(const MeasurableMesh& surface, const MeasurableMesh& other);
+Changes standing_out(const MeasurableMesh& surface,
+                     const MeasurableMesh& other,
+                     const M3c2Request& request = {});
 
 }  // namespace cgs

@@ -134,15 +134,22 @@ TwoDates read_two_dates(const std::filesystem::path& earlier,
     lay_by_photographs(out, !are_metric, terminal);
     lay_by_surfaces(out, !are_metric, terminal);
   }
+  if (are_metric) {
+    out.scale_sigma = relative_scale_sigma(before, surface.frame);
+    out.scale_center = unmoved_by_scale(out.later_surface, surface.frame, !is_registered);
+  }
   share_scale(out, surface.frame);
   return out;
 }
 
 DateChanges changes_between(const TwoDates& dates, const Progress& progress) {
+  M3c2Request request;
+  request.scale_sigma = dates.scale_sigma;
+  request.scale_center = dates.scale_center;
   DateChanges out;
-  out.gained = standing_out(dates.later_surface, dates.earlier_surface);
+  out.gained = standing_out(dates.later_surface, dates.earlier_surface, request);
   report(progress, 0.5);
-  out.lost = standing_out(dates.earlier_surface, dates.later_surface);
+  out.lost = standing_out(dates.earlier_surface, dates.later_surface, request);
   report(progress, 1);
   return out;
 }

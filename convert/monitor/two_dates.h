@@ -24,6 +24,11 @@ struct TwoDates {
   double ratio = 1;          ///< Units of the earlier date per unit of the later.
   size_t shared_places = 0;  ///< That photographs of both dates show; 0 where they were not asked.
   size_t agreeing_places = 0;
+  /// Relative standard deviation of one date's scale against the other's, where both know theirs; 0
+  /// where one was fitted to the other.
+  double scale_sigma = 0;
+  /// What an error of the scale leaves in its place [internal units].
+  Eigen::Vector3d scale_center = Eigen::Vector3d::Zero();
 
   /// A point in the world of the later date, or of the earlier, in the frame of the surfaces.
   Eigen::Vector3d from_later(const Eigen::Vector3d& world) const {

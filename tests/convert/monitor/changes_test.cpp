@@ -99,6 +99,24 @@ TEST(StandingOut, BelievesTheScatterOfTheSurfaceOverItsSigma) {
   EXPECT_TRUE(changes.patches.empty());
 }
 
+// A hill that is larger by half of what the scale may be wrong by has not grown.
+TEST(StandingOut, FindsNothingInAnErrorOfTheScale) {
+  const auto hill = [](double x, double y) {
+    return 0.4 * std::exp(-(x * x + y * y) / (2 * 0.2 * 0.2));
+  };
+  const MeasurableMesh before = sheet(hill, 0.001F);
+  MeasurableMesh after = before;
+  for (size_t v = 0; v < after.points.size(); ++v) {
+    after.points[v] *= 1.02;
+    after.mesh.vertices[v] = after.points[v].cast<float>();
+  }
+  EXPECT_FALSE(standing_out(after, before).patches.empty());  // of one scale, it has
+  M3c2Request request;
+  request.scale_sigma = 0.04;
+  EXPECT_TRUE(standing_out(after, before, request).patches.empty());
+  EXPECT_TRUE(standing_out(before, after, request).patches.empty());
+}
+
 TEST(StandingOut, TellsNoVolumeOfWhatStandsFree) {
   const auto post = [](double x, double y) {
     return std::max(std::abs(x), std::abs(y)) < 0.06 ? 0.5 : 0.0;
