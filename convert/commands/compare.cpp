@@ -101,13 +101,19 @@ void warn_of_inward(const std::filesystem::path& path,
                 "turns them");
 }
 
-void print_json(const CompareArgs& args,
-                const MeasurableMesh& a,
-                const MeasurableMesh& b,
+// What both files say, before A's frame is taken for both.
+nlohmann::ordered_json files_json(const CompareArgs& args,
+                                  const MeasurableMesh& a,
+                                  const MeasurableMesh& b) {
+  return {{"a", measured_json(args.a, a, figure_unit(a.frame, ""))},
+          {"b", measured_json(args.b, b, figure_unit(b.frame, ""))}};
+}
+
+void print_json(const nlohmann::ordered_json& files,
                 const FigureUnit& unit,
                 const nlohmann::ordered_json& found) {
-  nlohmann::ordered_json report = {{"a", measured_json(args.a, a, unit)},
-                                   {"b", measured_json(args.b, b, unit)}};
+  nlohmann::ordered_json report = files;
+  for (auto& file : report) file["unit"] = unit.name;  // of the figures
   report.update(found);
   print_report(report);
 }
@@ -128,14 +134,14 @@ void share_unit(Frame& a, const Frame& b, double growth) {
 
 // Cloud against cloud, along normals: what --m3c2 asks for.
 void print_m3c2(const CompareArgs& args,
+                const nlohmann::ordered_json& files,
                 const MeasurableMesh& a,
-                const MeasurableMesh& b,
                 const M3c2Comparison& found,
                 const FigureUnit& unit) {
   if (!args.ply.empty()) write_m3c2_ply(args.ply, a, found);
   if (!args.svg.empty()) write_histogram_svg(args.svg, found.comparison, unit, title_of(args));
   if (args.common.json) {
-    print_json(args, a, b, unit, m3c2_json(found, a, unit));
+    print_json(files, unit, m3c2_json(found, a, unit));
   } else {
     print_text(args, found.comparison, unit);
     std::printf("%s", m3c2_text(found, unit).c_str());
@@ -211,8 +217,7 @@ void run_compare(const CompareArgs& args) {
   Terminal terminal(args.common.quiet, args.common.strict);
   MeasurableFile first = read_measured(args.a, args.assume_unit);
   MeasurableFile second = read_measured(args.b, args.assume_unit);
-  terminal.warn(first.warnings);
-  terminal.warn(second.warnings);
+  for (const MeasurableFile* file : {&first, &second}) terminal.warn(file->warnings);
   check_clouds(args, second.content);
   // With --scale it may be in a unit that is known afterwards alone.
   if (!args.threshold.empty() && !args.scale) {
@@ -221,6 +226,7 @@ void run_compare(const CompareArgs& args) {
   check_units(args, first.content.frame, second.content.frame);
   const std::string turned = turned_text(first.content.frame, second.content.frame);
   if (!turned.empty() && !args.icp) terminal.warn({turned});
+  const nlohmann::ordered_json files = files_json(args, first.content, second.content);
   MeasurableMesh a = std::move(first.content);
   ScaleError of_scale{args.scale ? 0 : relative_scale_sigma(a.frame, second.content.frame)};
   MeasurableMesh b = in_frame_of(second.content, a.frame);
@@ -242,7 +248,7 @@ void run_compare(const CompareArgs& args) {
     request.scale_center = of_scale.center;
     M3c2Comparison found = compare_m3c2(request, a, b);
     found.comparison.registration = comparison.registration;
-    return print_m3c2(args, a, b, found, unit);
+    return print_m3c2(args, files, a, found, unit);
   }
   const auto compared = [&](ComparedPoints points) {
     add_scale_sigma(points, of_scale.relative, of_scale.center);
@@ -259,7 +265,7 @@ void run_compare(const CompareArgs& args) {
   }
   if (!args.svg.empty()) write_histogram_svg(args.svg, comparison, unit, title_of(args));
   if (args.common.json) {
-    print_json(args, a, b, unit, comparison_json(comparison, a, unit));
+    print_json(files, unit, comparison_json(comparison, a, unit));
   } else {
     print_text(args, comparison, unit);
   }

@@ -175,6 +175,11 @@ TEST(Compare, MatchesUnits) {
   const json out = json_of("compare " + (dir / "m.ply").string() + " " + (dir / "mm.ply").string() +
                            " --unit mm");
   EXPECT_NEAR(out["distance"]["mean"].get<double>(), 1, 1e-9);
+  // Each file keeps the scale that it states; figures of both are in one unit.
+  EXPECT_EQ(out["a"]["scale"]["metres_per_unit"], 1.0);
+  EXPECT_EQ(out["b"]["scale"]["metres_per_unit"], 0.001);
+  EXPECT_EQ(out["a"]["unit"], "mm");
+  EXPECT_EQ(out["b"]["unit"], "mm");
 }
 
 // A square of four faces, every one with its own vertices, that states everything.
