@@ -24,15 +24,17 @@ Json measured(const Json& model) {
   return views.is_array() && !views.empty() ? Json(measured_share(views)) : Json();
 }
 
-// Of the area of the closed mesh, that of the labels which the trait is true of.
+// Of the area of the closed mesh, that of the labels which the trait is true of. Null for runs of
+// earlier versions, which state fewer areas.
 template <typename Trait>
 Json area_share(const Json& certificate, const Trait& has_trait) {
   double all = 0;
   double of_trait = 0;
   for (const Provenance label : kProvenanceOrder) {
-    const auto area = certificate["area_" + provenance_key(label)].get<double>();
-    all += area;
-    if (has_trait(label)) of_trait += area;
+    const Json area = certificate.value("area_" + provenance_key(label), Json());
+    if (!area.is_number()) return Json();
+    all += area.get<double>();
+    if (has_trait(label)) of_trait += area.get<double>();
   }
   return all > 0 ? Json(of_trait / all) : Json();
 }

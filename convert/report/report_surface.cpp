@@ -26,17 +26,16 @@ class ShownUnit {
     factor_ = has_name ? 1 : metres;
     name_ = units == "unknown" ? "units" : has_name ? units : "m";
   }
-  std::string length(const Json& value) const { return power(value, 1) + " " + escaped(name_); }
-  std::string area(const Json& value) const {
-    return power(value, 2) + " " + escaped(name_) + "<sup>2</sup>";
-  }
-  std::string volume(const Json& value) const {
-    return power(value, 3) + " " + escaped(name_) + "<sup>3</sup>";
-  }
+  std::string length(const Json& value) const { return power(value, 1, ""); }
+  std::string area(const Json& value) const { return power(value, 2, "<sup>2</sup>"); }
+  std::string volume(const Json& value) const { return power(value, 3, "<sup>3</sup>"); }
 
  private:
-  std::string power(const Json& value, int exponent) const {
-    return number(std::pow(factor_, exponent) * value.get<double>());
+  // "-" for what is not stated.
+  std::string power(const Json& value, int exponent, const char* written) const {
+    if (!value.is_number()) return "-";
+    return number(std::pow(factor_, exponent) * value.get<double>()) + " " + escaped(name_) +
+           written;
   }
   double factor_ = 1;
   std::string name_;
