@@ -104,14 +104,16 @@ Json side_json(const Changes& changes, const FigureUnit& unit, const Frame& fram
          {"center", {center.x(), center.y(), center.z()}}});
   }
   const std::vector<double> detections = known_detections(changes.found);
-  const double detection = detections.empty() ? 0 : detections[detections.size() / 2];
+  const Json detection =
+      detections.empty() ? Json()
+                         : Json(unit.length * changes.noise * detections[detections.size() / 2]);
   return {{"area", area * total.area},
           {"volume", volume * total.volume},
           {"volume_sigma", with_scale(total.volume, total.volume_sigma)},
           {"without_volume", total.without_volume},
           {"comparable", changes.comparable},
           {"noise", changes.noise},
-          {"detection", unit.length * changes.noise * detection},
+          {"detection", detection},
           {"patches", patches}};
 }
 
