@@ -68,7 +68,7 @@ void run_monitor(const MonitorArgs& args) {
   write_m3c2_ply(args.output / "later.ply", dates.later_surface, changes.gained.found);
   write_m3c2_ply(args.output / "earlier.ply", dates.earlier_surface, changes.lost.found);
   write_file(args.output / "changes.json", json_text(versioned(report)) + "\n");
-  write_monitor_page(args.output / "index.html", report, pictures);
+  write_monitor_page(args.output / "index.html", report, dates.earlier_surface, pictures);
   if (args.common.json) {
     print_report(report);
     return;

@@ -2,11 +2,13 @@
 #include "convert/monitor/monitor_page.h"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
 #include <tbb/parallel_for.h>
 
+#include "convert/measure/comparison.h"
 #include "convert/report/page_files.h"
 #include "convert/text/html.h"
 #include "io/bytes/atomic_file.h"
@@ -87,10 +89,31 @@ std::string figure(const DatePicture& picture) {
          name + "</p>\n";
 }
 
-std::string table_of(const Json& side, const std::string& unit) {
+// How places in the world of the earlier date are written.
+struct WorldPlaces {
+  std::string unit;    // as HTML
+  std::string format;  // of a coordinate: to a thousandth of the scene, however far from zero it is
+};
+
+WorldPlaces world_places(const MeasurableMesh& earlier) {
+  constexpr double kMostDecimals = 9;
+  const std::string unit = earlier.frame.unit_name();
+  const bool has_name = unit.find(' ') == std::string::npos;
+  const double size = earlier.frame.scale * box_of(earlier).diagonal().norm();
+  const double decimals =
+      size > 0 ? std::clamp(3 - std::floor(std::log10(size)), 0.0, kMostDecimals) : kMostDecimals;
+  return {unit == "unknown" ? "units"
+          : has_name        ? unit
+                            : "units of " + escaped(unit),
+          "%." + std::to_string(std::lround(decimals)) + "f"};
+}
+
+std::string table_of(const Json& side, const std::string& unit, const WorldPlaces& places) {
+  const char* const format = places.format.c_str();
   std::ostringstream html;
   html << "<table>\n<tr><th></th><th>area [" << unit << "²]</th><th>stands out by [" << unit
-       << "]</th><th>volume [" << unit << "³]</th><th>in the middle</th></tr>\n";
+       << "]</th><th>volume [" << unit << "³]</th><th>in the middle: x, y, z [" << places.unit
+       << "]</th></tr>\n";
   int number_of_row = 0;
   for (const Json& patch : side["patches"]) {
     const Json& center = patch["center"];
@@ -99,15 +122,18 @@ std::string table_of(const Json& side, const std::string& unit) {
          << (patch["volume"].is_null()
                  ? std::string("not known: stands free")
                  : number(patch["volume"], "%.3g") + " ± " + number(patch["volume_sigma"], "%.2g"))
-         << "</td><td>" << number(center[0]) << ", " << number(center[1]) << ", "
-         << number(center[2]) << "</td></tr>\n";
+         << "</td><td>" << number(center[0], format) << ", " << number(center[1], format) << ", "
+         << number(center[2], format) << "</td></tr>\n";
   }
   html << "</table>\n";
   return html.str();
 }
 
-std::string side_of(const char* title, const char* color, const Json& side, const Json& report) {
-  const auto unit = escaped(report["unit"].get<std::string>());
+std::string side_of(const char* title,
+                    const char* color,
+                    const Json& side,
+                    const std::string& unit,
+                    const WorldPlaces& places) {
   std::ostringstream html;
   html << "<h2><span style=\"color:" << color << "\">■</span> " << title << "</h2>\n<p>"
        << side["patches"].size() << " pieces, " << number(side["area"], "%.3g") << " " << unit
@@ -115,8 +141,18 @@ std::string side_of(const char* title, const char* color, const Json& side, cons
        << number(side["volume_sigma"], "%.2g") << " " << unit << "³; told from "
        << number(side["detection"], "%.2g") << " " << unit << " on (median, 95 %), at "
        << percent(side["comparable"]) << " of the surface.</p>\n";
-  if (!side["patches"].empty()) html << table_of(side, unit);
+  if (!side["patches"].empty()) html << table_of(side, unit, places);
   return html.str();
+}
+
+std::string registration_words(const Json& registration) {
+  const bool was_moved = registration["shared_places"].get<size_t>() > 0;
+  if (!was_moved) return "Both dates were taken as being in one frame; nothing was moved.";
+  return number(registration["agreeing_places"], "%.0f") + " of " +
+         number(registration["shared_places"], "%.0f") +
+         " places that photographs of both dates show agree on one motion; then " +
+         percent(registration["share"]) +
+         " of the surface laid itself onto the earlier. What changed was left out of both.";
 }
 
 constexpr const char* kStyle =
@@ -183,10 +219,15 @@ std::vector<DatePicture> date_pictures(TwoDates& dates,
 
 void write_monitor_page(const std::filesystem::path& path,
                         const Json& report,
+                        const MeasurableMesh& earlier,
                         const std::vector<DatePicture>& pictures) {
+  const std::string unit = escaped(report["unit"].get<std::string>());
+  const WorldPlaces places = world_places(earlier);
   std::ostringstream html;
   html
-      << "<!DOCTYPE html>\n<html lang=en><meta charset=utf-8><title>Two dates</title>\n<style>"
+      << "<!DOCTYPE html>\n<html lang=en><meta charset=utf-8>"
+         "<meta name=viewport content=\"width=device-width,initial-scale=1\"><title>Two "
+         "dates</title>\n<style>"
       << page_files().style << kStyle << "</style>\n<h1>"
       << escaped(report["earlier"].get<std::string>()) << " and "
       << escaped(report["later"].get<std::string>())
@@ -194,14 +235,10 @@ void write_monitor_page(const std::filesystem::path& path,
          "date sees it; right of it the later photograph. <label><input type=checkbox id=show "
          "checked> what changed: red was gained, blue was lost</label></p>\n";
   for (const DatePicture& picture : pictures) html << figure(picture);
-  html << side_of("Gained", "#db331f", report["gained"], report)
-       << side_of("Lost", "#215cdb", report["lost"], report) << "<p>"
-       << number(report["registration"]["agreeing_places"]) << " of "
-       << number(report["registration"]["shared_places"])
-       << " places that photographs of both dates show agree on one motion; then "
-       << percent(report["registration"]["share"])
-       << " of the surface laid itself onto the earlier. What changed was left out of both.</p>\n"
-       << "<script>" << kScript << "</script>\n</html>\n";
+  html << side_of("Gained", "#db331f", report["gained"], unit, places)
+       << side_of("Lost", "#215cdb", report["lost"], unit, places) << "<p>"
+       << registration_words(report["registration"]) << "</p>\n<script>" << kScript
+       << "</script>\n</html>\n";
   write_file(path, html.str());
 }
 

@@ -30,9 +30,11 @@ std::vector<DatePicture> date_pictures(TwoDates& dates,
 /// index.html: both dates at a slider, what changed at a switch, and the figures; loads nothing
 /// from elsewhere.
 /// \param report  as monitor_json()
+/// \param earlier  surface of the earlier date, in whose world places are told
 /// \throws IoError
 void write_monitor_page(const std::filesystem::path& path,
                         const nlohmann::ordered_json& report,
+                        const MeasurableMesh& earlier,
                         const std::vector<DatePicture>& pictures);
 
 }  // namespace cgs
