@@ -162,11 +162,14 @@ constexpr const char* kStyle =
     ".dates .change{opacity:.6}.plain .change{display:none}"
     ".dates input{position:absolute;inset:auto 0 0 0;width:100%;margin:0}";
 
+// Browsers bring back what was set before: what is shown follows, once they have.
 constexpr const char* kScript =
     "for(const f of document.querySelectorAll('.dates')){const s=f.querySelector('input');"
-    "s.oninput=()=>{f.querySelector('.before').style.clipPath=`inset(0 ${100-s.value}% 0 0)`;}}"
-    "document.getElementById('show').onchange=e=>"
-    "document.body.classList.toggle('plain',!e.target.checked);";
+    "s.oninput=()=>{f.querySelector('.before').style.clipPath=`inset(0 ${100-s.value}% 0 0)`;};"
+    "addEventListener('pageshow',s.oninput);}"
+    "const show=document.getElementById('show');"
+    "show.onchange=()=>document.body.classList.toggle('plain',!show.checked);"
+    "addEventListener('pageshow',show.onchange);";
 
 }  // namespace
 

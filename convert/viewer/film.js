@@ -42,6 +42,8 @@
     pause();
     show(Number(slider.value));
   });
+  // Browsers bring back where it stood before.
+  window.addEventListener('pageshow', () => show(Number(slider.value)));
   play.addEventListener('click', toggle);
   const keys = {
     h: () => holes.click(), ' ': toggle,

@@ -352,6 +352,7 @@
     }
     redraw();
   }
+  window.addEventListener('pageshow', section);  // browsers bring back what was set before
   axis.addEventListener('change', section);
   cut.addEventListener('input', section);
   side.addEventListener('click', () => {

@@ -397,6 +397,13 @@ class Film(unittest.TestCase):
         self.assertEqual(seen, {str(k) for k in range(self.FRAMES)})
         self.assertIn('frame_0000', self.shown().text)
 
+    def test_shows_the_frame_of_the_slider_after_it_was_loaded_again(self):
+        self.press(Keys.ARROW_RIGHT * 3)
+        self.driver.refresh()
+        self.addCleanup(self.press, Keys.ARROW_LEFT * self.FRAMES)
+        frame = self.driver.find_element(By.ID, 'frame').get_attribute('value')
+        self.assertIn(f'frame_000{frame}', self.shown().text)
+
 
 class OtherBrowsers(unittest.TestCase):
     def open(self, name, *more, **options):
