@@ -52,6 +52,8 @@
   document.addEventListener('keydown', (event) => {
     const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!act || event.ctrlKey || event.altKey || event.metaKey) return;
+    // Space ticks and presses what has the focus.
+    if (event.key === ' ' && event.target.closest('button, input[type=checkbox]')) return;
     event.preventDefault();
     act();
   });

@@ -397,6 +397,17 @@ class Film(unittest.TestCase):
         self.assertEqual(seen, {str(k) for k in range(self.FRAMES)})
         self.assertIn('frame_0000', self.shown().text)
 
+    def test_leaves_space_to_what_has_the_focus(self):
+        holes = self.driver.find_element(By.ID, 'holes')
+        play = self.driver.find_element(By.ID, 'play')
+        for ticked in (True, False):
+            holes.send_keys(' ')
+            self.assertEqual(holes.is_selected(), ticked)
+            self.assertEqual(play.get_attribute('aria-pressed'), 'false')
+        for pressed in ('true', 'false'):
+            play.send_keys(' ')
+            self.assertEqual(play.get_attribute('aria-pressed'), pressed)
+
     def test_shows_the_frame_of_the_slider_after_it_was_loaded_again(self):
         self.press(Keys.ARROW_RIGHT * 3)
         self.driver.refresh()
