@@ -392,9 +392,10 @@
     Enter: () => pick(0, 0), Escape: clearEnds, h: () => invented.click(),
   };
   canvas.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || !keys[event.key]) return;
+    const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (event.ctrlKey || event.altKey || event.metaKey || !act) return;
     event.preventDefault();
-    keys[event.key]();
+    act();
   });
 
   // ---- Drawing ------------------------------------------------------------------------------

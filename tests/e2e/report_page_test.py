@@ -276,6 +276,10 @@ class ReportPage(unittest.TestCase):
         self.assertLess(share_of_magenta(self.page.picture()), 1e-4)  # the cross is of that colour
         canvas.send_keys(Keys.ENTER)  # nothing is there to be picked
         self.assertIn('Pick two points', self.page.measured())
+        canvas.send_keys('H')  # as with Caps Lock
+        self.assertGreater(share_of_magenta(self.page.picture()), 0.2)
+        self.page.press('Surface that nothing measured')
+        self.assertLess(share_of_magenta(self.page.picture()), 1e-4)
         self.page.press('Surface that nothing measured')
         self.assertGreater(share_of_magenta(self.page.picture()), 0.2)
 
