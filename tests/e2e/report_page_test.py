@@ -80,6 +80,9 @@ class Page:
     def __init__(self, *more, **options):
         self.driver = browser(*more, **options)
         self.driver.get((OUT / 'report.html').resolve().as_uri())
+        self.wait()
+
+    def wait(self):
         for _ in range(600):
             if self.state():
                 break
@@ -330,6 +333,19 @@ class ReportPage(unittest.TestCase):
         axis.select_by_visible_text('none')
         self.assertLess(changed(whole, self.page.picture()), 0.01)
 
+    def test_cuts_where_the_controls_that_the_browser_brings_back_say(self):
+        driver = self.page.driver
+        Select(driver.find_element(By.ID, 'viewer-axis')).select_by_visible_text('z')
+        self.page.settle()
+        said = driver.find_element(By.ID, 'viewer-cut-text').text
+        driver.get('data:text/html,elsewhere')
+        driver.back()
+        self.page.wait()
+        self.addCleanup(lambda: Select(driver.find_element(By.ID, 'viewer-axis')).select_by_visible_text('none'))
+        self.assertEqual(driver.find_element(By.ID, 'viewer-axis').get_attribute('value'), 'z')
+        self.assertEqual(driver.find_element(By.ID, 'viewer-cut-text').text, said)
+        self.assertTrue(driver.find_element(By.ID, 'viewer-cut').is_enabled())
+
     def test_holes_can_be_laid_over_the_photographs(self):
         # view_08 looks from where no photograph was taken. Its mask is laid over two pictures.
         row = self.page.driver.find_element(By.XPATH, '//h3[starts-with(., "view_08")]/following::div[1]')
@@ -411,13 +427,15 @@ class Film(unittest.TestCase):
         for pressed in ('true', 'false'):
             play.send_keys(' ')
             self.assertEqual(play.get_attribute('aria-pressed'), pressed)
+        self.press(Keys.ARROW_LEFT * self.FRAMES)
 
-    def test_shows_the_frame_of_the_slider_after_it_was_loaded_again(self):
-        self.press(Keys.ARROW_RIGHT * 3)
-        self.driver.refresh()
+    def test_shows_the_frame_of_the_slider_that_the_browser_brings_back(self):
+        self.driver.find_element(By.ID, 'frame').send_keys(Keys.ARROW_RIGHT * 3)
         self.addCleanup(self.press, Keys.ARROW_LEFT * self.FRAMES)
-        frame = self.driver.find_element(By.ID, 'frame').get_attribute('value')
-        self.assertIn(f'frame_000{frame}', self.shown().text)
+        self.driver.get('data:text/html,elsewhere')
+        self.driver.back()
+        self.assertEqual(self.driver.find_element(By.ID, 'frame').get_attribute('value'), '3')
+        self.assertIn('frame_0003', self.shown().text)
 
 
 class OtherBrowsers(unittest.TestCase):
