@@ -140,26 +140,6 @@ Json gaussians_json(const Gaussians& gaussians) {
       {"count", gaussians.size()}, {"positions", base64(positions)}, {"colors", base64(colors)}};
 }
 
-// What the shown faces are, in words, with what was measured of them.
-std::string shown_text(const ShownMesh& shown, const Frame& frame) {
-  std::ostringstream html;
-  html << "<p>" << shown.mesh.faces.size();
-  if (shown.mesh.faces.size() == shown.faces_before) {
-    html << " faces: the watertight mesh as it is in <code>mesh/watertight.ply</code>.</p>\n";
-    return html.str();
-  }
-  const std::string unit = frame.has_metric_scale() ? escaped(frame.unit_name()) : "units";
-  const auto length = [&](double internal) { return number(internal * frame.scale) + " " + unit; };
-  const double rms = std::max(shown.evidence.accuracy.rms, shown.evidence.completeness.rms);
-  html
-      << " of the " << shown.faces_before
-      << " faces of <code>mesh/watertight.ply</code>. Measured both ways, what is shown is at most "
-      << length(shown.evidence.hausdorff()) << " (RMS " << length(rms)
-      << ") off where there is evidence, at most " << length(shown.inferred.hausdorff())
-      << " where the surface is inferred or estimated. Points are picked on what is shown.</p>\n";
-  return html.str();
-}
-
 // JSON that may stand in a script element: no text in it can end the element.
 std::string inert(std::string json) {
   for (size_t at = json.find('<'); at != std::string::npos; at = json.find('<', at)) {
@@ -190,6 +170,27 @@ ShownMesh shown_mesh(const TriangleMesh& mesh, size_t most_faces, const Progress
     if (double(out.mesh.faces.size()) <= kNearEnough * double(most_faces)) break;
   }
   return out;
+}
+
+std::string shown_text(const ShownMesh& shown, const Frame& frame) {
+  std::ostringstream html;
+  html << "<p>" << shown.mesh.faces.size();
+  if (shown.mesh.faces.size() == shown.faces_before) {
+    html << " faces: the watertight mesh as it is in <code>mesh/watertight.ply</code>.</p>\n";
+    return html.str();
+  }
+  const FigureUnit unit = figure_unit(frame, "");
+  const auto length = [&](double internal) {
+    return number(internal * unit.length) + " " + unit.name;
+  };
+  const double rms = std::max(shown.evidence.accuracy.rms, shown.evidence.completeness.rms);
+  html
+      << " of the " << shown.faces_before
+      << " faces of <code>mesh/watertight.ply</code>. Measured both ways, what is shown is at most "
+      << length(shown.evidence.hausdorff()) << " (RMS " << length(rms)
+      << ") off where there is evidence, at most " << length(shown.inferred.hausdorff())
+      << " where the surface is inferred or estimated. Points are picked on what is shown.</p>\n";
+  return html.str();
 }
 
 Json viewer_scene(const Model& model, const TriangleMesh& mesh) {

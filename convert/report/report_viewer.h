@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "convert/model/model.h"
+#include "libcgs/core/frame.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
 #include "meshing/mesh/mesh_distance.h"
@@ -25,6 +26,9 @@ struct ShownMesh {
 /// label keeping its area; else the nearest to it that can.
 /// \pre mesh has faces
 ShownMesh shown_mesh(const TriangleMesh& mesh, size_t most_faces, const Progress& progress);
+
+/// What the shown faces are, in words, as HTML: lengths in the unit of the viewer's figures.
+std::string shown_text(const ShownMesh& shown, const Frame& frame);
 
 /// What the viewer of the report shows, as viewer.js reads it: the mesh with its evidence in the
 /// frame of the model, photographs as its texture, input cameras, a sample of the Gaussians, and

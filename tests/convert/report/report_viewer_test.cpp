@@ -169,6 +169,20 @@ TEST(ShownMesh, IsTheMeshWhereItIsSmallEnough) {
   EXPECT_EQ(shown.evidence.hausdorff(), 0);
 }
 
+TEST(ShownText, IsInMetresWhereTheUnitOfFilesHasNoName) {
+  ShownMesh shown;
+  shown.mesh.faces.resize(10);
+  shown.faces_before = 20;
+  shown.evidence.accuracy.max = 0.01;
+  Frame frame;
+  frame.scale = 2;
+  EXPECT_NE(shown_text(shown, frame).find("at most 0.02 units (RMS"), std::string::npos);
+  frame.metres_per_unit = 0.37;
+  const std::string text = shown_text(shown, frame);
+  EXPECT_NE(text.find("10 of the 20 faces"), std::string::npos) << text;
+  EXPECT_NE(text.find("at most 0.0074 m (RMS"), std::string::npos) << text;
+}
+
 // A sphere with a quarter of the faces: every vertex must lie within what is stated of the true
 // radius.
 TEST(ShownMesh, HasFewerFacesAndSaysHowFarItIsOff) {
