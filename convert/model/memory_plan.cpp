@@ -7,6 +7,7 @@
 #include <fstream>
 #include <limits>
 #include <numeric>
+#include <string>
 
 #include "io/images/image.h"
 #include "libcgs/core/error.h"
@@ -222,10 +223,53 @@ size_t free_of_group(const std::filesystem::path& folder, const char* most, cons
   std::ifstream stat(folder / "memory.stat");
   std::string key;
   size_t bytes = 0;
+  size_t cached = 0;
+  size_t cached_below = 0;  // with groups below, which version 1 tells apart and `used` holds
   while (stat >> key >> bytes) {
-    if (key == "inactive_file" || key == "active_file") used -= std::min(used, bytes);
+    if (key == "inactive_file" || key == "active_file") cached += bytes;
+    if (key == "total_inactive_file" || key == "total_active_file") cached_below += bytes;
   }
+  used -= std::min(used, std::max(cached, cached_below));
   return limit - std::min(limit, used);
+}
+
+namespace {
+
+// The least of a group below where groups are mounted, and those above it.
+size_t free_up_from(const std::filesystem::path& mount,
+                    std::filesystem::path group,
+                    const char* most,
+                    const char* now) {
+  size_t out = kUnlimited;
+  for (;; group = group.parent_path()) {
+    out = std::min(out, free_of_group(mount / group, most, now));
+    if (group.empty()) return out;
+  }
+}
+
+}  // namespace
+
+size_t free_of_groups(const std::filesystem::path& root, std::istream& of_process) {
+  const auto in_first_version = [&](const std::filesystem::path& group) {
+    return free_up_from(root / "memory", group, "memory.limit_in_bytes", "memory.usage_in_bytes");
+  };
+  const auto in_second = [&](const std::filesystem::path& group) {
+    return free_up_from(root, group, "memory.max", "memory.current");
+  };
+  // A container may be told its path outside, which it does not have.
+  size_t out = std::min(in_first_version({}), in_second({}));
+  for (std::string line; std::getline(of_process, line);) {
+    const size_t first = line.find(':');
+    const size_t second = first == std::string::npos ? first : line.find(':', first + 1);
+    if (second == std::string::npos) continue;
+    const std::string controllers = "," + line.substr(first + 1, second - first - 1) + ",";
+    const auto group = std::filesystem::path(line.substr(second + 1)).relative_path();
+    if (controllers == ",,") out = std::min(out, in_second(group));
+    if (controllers.find(",memory,") != std::string::npos) {
+      out = std::min(out, in_first_version(group));
+    }
+  }
+  return out;
 }
 
 std::vector<SplatMemory> splat_memory_plan(const SplatWork& work) {
@@ -282,11 +326,8 @@ void check_splat_memory_plan(const SplatWork& work, size_t budget) {
 
 size_t memory_budget(size_t limit) {
   if (limit > 0) return limit;
-  const std::filesystem::path groups = "/sys/fs/cgroup";
-  const size_t free = std::min(
-      {free_of_machine(),
-       free_of_group(groups, "memory.max", "memory.current"),
-       free_of_group(groups / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes")});
+  std::ifstream of_process("/proc/self/cgroup");
+  const size_t free = std::min(free_of_machine(), free_of_groups("/sys/fs/cgroup", of_process));
   return free == kUnlimited ? size_t{4} << 30 : free / 10 * 8;
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <iosfwd>
 #include <string>
 #include <vector>
 
@@ -99,5 +100,11 @@ size_t memory_budget(size_t limit);
 /// files that are only cached [bytes]; the largest number if there is no such limit.
 /// Source: Linux kernel, admin-guide/cgroup-v2 (memory.max, memory.current) and cgroup-v1/memory.
 size_t free_of_group(const std::filesystem::path& folder, const char* most, const char* now);
+
+/// The least of that over the groups that a process is in, of either version, and those above them.
+/// \param root        where groups are mounted, /sys/fs/cgroup
+/// \param of_process  lines as of /proc/self/cgroup: "0::/PATH", "4:memory:/PATH"
+/// Source: Linux manual, cgroups(7).
+size_t free_of_groups(const std::filesystem::path& root, std::istream& of_process);
 
 }  // namespace cgs

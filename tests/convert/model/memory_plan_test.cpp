@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
+#include <sstream>
 
 #include <gtest/gtest.h>
 
@@ -128,6 +129,46 @@ TEST(FreeOfGroup, IsWhatAContainerMayStillTake) {
   EXPECT_EQ(free(), 500u);
   test::write_bytes(dir / "memory.max", "400\n");
   EXPECT_EQ(free(), 0u);
+}
+
+// Of a service or a container that is not the root of what is mounted.
+TEST(FreeOfGroups, IsTheLeastOfTheGroupOfTheProcessAndThoseAboveIt) {
+  const test::TempDir dir;
+  const auto free = [&](const std::string& of_process) {
+    std::istringstream lines(of_process);
+    return free_of_groups(dir.path(), lines);
+  };
+  const size_t unlimited = std::numeric_limits<size_t>::max();
+  const auto write = [&](const std::string& group, const char* most, const char* now) {
+    test::write_bytes(dir / (group + "memory.max"), most);
+    test::write_bytes(dir / (group + "memory.current"), now);
+  };
+  write("system/", "900\n", "100\n");
+  write("system/run/", "max\n", "100\n");
+  write("system/run/job/", "1000\n", "100\n");
+  EXPECT_EQ(free("0::/\n"), unlimited);
+  EXPECT_EQ(free(""), unlimited);
+  EXPECT_EQ(free("0::/system/run/job\n"), 800u);
+  write("system/run/job/", "500\n", "100\n");
+  EXPECT_EQ(free("3:cpuset:/\n0::/system/run/job\n"), 400u);
+  EXPECT_EQ(free("0::/elsewhere/job\n"), unlimited) << "a path outside of the container";
+  write("", "300\n", "100\n");
+  EXPECT_EQ(free("0::/elsewhere/job\n"), 200u);
+}
+
+TEST(FreeOfGroups, KnowsTheFirstVersion) {
+  const test::TempDir dir;
+  const auto free = [&](const std::string& of_process) {
+    std::istringstream lines(of_process);
+    return free_of_groups(dir.path(), lines);
+  };
+  test::write_bytes(dir / "memory/slurm/job/memory.limit_in_bytes", "1000\n");
+  test::write_bytes(dir / "memory/slurm/job/memory.usage_in_bytes", "700\n");
+  test::write_bytes(dir / "memory/slurm/job/memory.stat",
+                    "inactive_file 50\nactive_file 0\ntotal_inactive_file 150\n"
+                    "total_active_file 100\n");
+  EXPECT_EQ(free("9:cpu,memory:/slurm/job/step\n0::/\n"), 550u);
+  EXPECT_EQ(free("9:cpu:/slurm/job\n0::/slurm/job\n"), std::numeric_limits<size_t>::max());
 }
 
 TEST(MemoryPlan, CountsNetworksWhileTheyAreTrained) {
