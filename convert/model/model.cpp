@@ -2,6 +2,7 @@
 #include "convert/model/model.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <string>
@@ -35,17 +36,39 @@ std::vector<float> as_floats(const Raster<T>& raster) {
   return out;
 }
 
-template <typename T>
-Raster<T> as_raster(const ExrImage& image, const std::string& channel, const std::string& file) {
+Raster<float> as_raster(const ExrImage& image,
+                        const std::string& channel,
+                        const std::string& file) {
   const std::vector<float>* values = image.find(channel);
   if (values == nullptr) {
     throw BadInput(Defect::Schema, file, "has no channel '" + channel + "'");
   }
-  Raster<T> raster(image.width, image.height, T{});
-  std::transform(values->begin(), values->end(), raster.data.begin(), [](float value) {
-    return static_cast<T>(value);
-  });
+  Raster<float> raster(image.width, image.height, 0);
+  raster.data = *values;
   return raster;
+}
+
+// Of what was written as bytes. Others are refused: cut to a byte, one label would become another.
+Raster<uint8_t> as_bytes(const ExrImage& image,
+                         const std::string& channel,
+                         const std::string& file) {
+  const Raster<float> values = as_raster(image, channel, file);
+  Raster<uint8_t> out(image.width, image.height, 0);
+  for (int y = 0; y < values.height; ++y) {
+    for (int x = 0; x < values.width; ++x) {
+      const float value = values(x, y);
+      if (!(value >= 0 && value <= 255 && value == std::floor(value))) {
+        throw BadInput(Defect::Value,
+                       file,
+                       "channel '" + channel +
+                           "' must hold whole numbers in 0 ... 255, but holds " +
+                           std::to_string(value) + " at pixel (" + std::to_string(x) + ", " +
+                           std::to_string(y) + ")");
+      }
+      out(x, y) = static_cast<uint8_t>(value);
+    }
+  }
+  return out;
 }
 
 std::filesystem::path priors_path(const std::filesystem::path& folder, const View& view) {
@@ -81,15 +104,15 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
   }
   const std::string file = path.string();
   ViewPriors priors;
-  priors.depth = as_raster<float>(image, "Z", file);
-  priors.sigma = as_raster<float>(image, "sigma.Y", file);
-  priors.confidence = as_raster<float>(image, "confidence.Y", file);
-  priors.layer = as_raster<uint8_t>(image, "layer.Y", file);
-  priors.matched_views = as_raster<uint8_t>(image, "matched.Y", file);
+  priors.depth = as_raster(image, "Z", file);
+  priors.sigma = as_raster(image, "sigma.Y", file);
+  priors.confidence = as_raster(image, "confidence.Y", file);
+  priors.layer = as_bytes(image, "layer.Y", file);
+  priors.matched_views = as_bytes(image, "matched.Y", file);
   if (image.find("shown_finer.Y") != nullptr) {
-    priors.shown_finer = as_raster<uint8_t>(image, "shown_finer.Y", file);
+    priors.shown_finer = as_bytes(image, "shown_finer.Y", file);
   }
-  const Raster<uint8_t> origin = as_raster<uint8_t>(image, "origin.Y", file);
+  const Raster<uint8_t> origin = as_bytes(image, "origin.Y", file);
   priors.origin = Raster<DepthOrigin>(image.width, image.height, DepthOrigin::Unknown);
   std::transform(origin.data.begin(), origin.data.end(), priors.origin.data.begin(), [](uint8_t v) {
     return v > static_cast<uint8_t>(DepthOrigin::Background) ? DepthOrigin::Unknown

@@ -6,7 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include "io/images/exr.h"
 #include "io/scenes/scene_reader.h"
+#include "libcgs/core/error.h"
 #include "tests/support/exif_segment.h"
 #include "tests/support/sample_splats.h"
 #include "tests/support/scene_files.h"
@@ -177,6 +179,42 @@ TEST(ReadModel, KnowsWhichViewDrawsAPlace) {
   model.priors[0].shown_finer(1, 0) = 1;
   write_model(dir.path(), model);
   EXPECT_EQ(read_model(dir.path()).priors[0].shown_finer.data, model.priors[0].shown_finer.data);
+}
+
+// 257 would be Measured in a byte, 261 Estimated.
+TEST(ReadModel, RefusesLabelsThatNoByteHolds) {
+  const test::TempDir dir;
+  Model model = model_of_one_view(dir.path());
+  ViewPriors priors;
+  priors.depth = priors.sigma = priors.confidence = DepthMap(2, 2, 1);
+  priors.layer = priors.matched_views = Raster<uint8_t>(2, 2, 0);
+  priors.origin = Raster<DepthOrigin>(2, 2, DepthOrigin::Measured);
+  model.priors = {priors};
+  model.scene.input = {0};
+  write_model(dir.path(), model);
+  const std::filesystem::path file = dir / "priors/a.exr";
+  const ExrImage good = read_exr(file);
+  for (const char* channel : {"origin.Y", "layer.Y", "matched.Y"}) {
+    for (const float value : {257.0F, -1.0F, 0.5F, std::nanf("")}) {
+      ExrImage image = good;
+      for (auto& [name, values] : image.channels) {
+        if (name == channel) values[3] = value;
+      }
+      write_exr(file, image);
+      try {
+        read_model(dir.path());
+        ADD_FAILURE() << channel << ' ' << value;
+      } catch (const BadInput& error) {
+        const std::string words = error.what();
+        EXPECT_EQ(error.defect(), Defect::Value) << words;
+        EXPECT_NE(words.find("a.exr"), std::string::npos) << words;
+        EXPECT_NE(words.find(std::string("channel '") + channel), std::string::npos) << words;
+        EXPECT_NE(words.find("at pixel (1, 1)"), std::string::npos) << words;
+      }
+    }
+  }
+  write_exr(file, good);
+  EXPECT_EQ(read_model(dir.path()).priors[0].origin.data, priors.origin.data);
 }
 
 // The cameras of such scenes are in a file that states no frame, those of their models are not.
