@@ -15,6 +15,7 @@
 #include "convert/text/figures.h"
 #include "io/bytes/mesh_arrays.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/remedy.h"
 
 namespace cgs {
 
@@ -91,6 +92,17 @@ void require_something_left(const PreparedFilter& filter, const Tally& before, c
                        std::to_string(before.faces) + " faces, so nothing was written");
 }
 
+// Libraries complain without knowing which operation they work for.
+FilterRemark run_named(const PreparedFilter& filter, FilterState& state, const Progress& progress) {
+  try {
+    return filter.run(state, progress);
+  } catch (const InvalidInput& error) {
+    const std::string words = error.what();
+    if (words.rfind("--op ", 0) == 0 || remedy_of(error) != Remedy::None) throw;
+    throw InvalidInput("--op " + filter.text + ": " + words);
+  }
+}
+
 }  // namespace
 
 std::vector<PreparedFilter> prepare_filters(const std::vector<std::string>& typed,
@@ -115,7 +127,7 @@ Json run_filters(FilterState& state,
   for (const PreparedFilter& filter : filters) {
     const Progress progress = terminal.begin(one_line(filter.text));
     cgs::report(progress, 0);
-    FilterRemark remark = filter.run(state, progress);
+    FilterRemark remark = run_named(filter, state, progress);
     const Tally after = tally(state);
     require_something_left(filter, before, after);
     const double seconds = terminal.end(change_text(before, after, state.frame) +

@@ -42,6 +42,7 @@ FilterStep prepare_radius_outliers(FilterArguments& arguments) {
 FilterStep prepare_voxel(FilterArguments& arguments) {
   const double side = arguments.length();
   return [side](FilterState& state, const Progress&) {
+    require_cloud(state, "voxel");
     state.mesh = down_sampled(state.mesh, side / state.frame.scale);
     return std::string();
   };

@@ -122,7 +122,7 @@ SmoothedMesh smoothed(const TriangleMesh& mesh,
   options.validate();
   constexpr uint32_t kMostVertices = 0x7fffffff;
   require(mesh.vertices.size() <= kMostVertices,
-          "smoothing takes up to 2^31 - 1 vertices, the number",
+          "the number of vertices to smooth must be <= 2^31 - 1",
           mesh.vertices.size());
   const Neighborhood around = neighborhood(mesh);
   SmoothedMesh out{mesh, around.locked, 0, 0};

@@ -102,7 +102,7 @@ void turn_part(std::vector<Eigen::Vector3f>& normals,
 
 std::vector<Eigen::Vector3f> estimated_normals(const std::vector<Eigen::Vector3f>& points,
                                                size_t neighbors) {
-  require(neighbors >= 3, "normals need 3 neighbours or more; the number", neighbors);
+  require(neighbors >= 3, "the number of neighbours that give a normal must be >= 3", neighbors);
   const KdTree tree(points);
   std::vector<Eigen::Vector3f> out(points.size(), Eigen::Vector3f::Zero());
   tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kGrain), [&](const auto& range) {
@@ -145,7 +145,9 @@ void turn_towards(std::vector<Eigen::Vector3f>& normals,
 std::vector<uint32_t> turn_consistently(std::vector<Eigen::Vector3f>& normals,
                                         const std::vector<Eigen::Vector3f>& points,
                                         size_t neighbors) {
-  require(neighbors >= 1, "turning normals needs 1 neighbour or more; the number", neighbors);
+  require(neighbors >= 1,
+          "the number of neighbours that normals are turned by must be >= 1",
+          neighbors);
   DisjointSets parts(points.size());
   std::vector<std::vector<uint32_t>> tree(points.size());
   for (const Link& link : sorted_links(normals, points, neighbors)) {

@@ -53,7 +53,9 @@ StatedSurface::StatedSurface(const TriangleMesh& mesh) : search_(std::make_uniqu
     return;
   }
   constexpr size_t kNeighbors = 12;
-  require(!mesh.vertices.empty(), "a surface needs points, their number", mesh.vertices.size());
+  require(!mesh.vertices.empty(),
+          "the number of points of a surface must be > 0",
+          mesh.vertices.size());
   search_->points.emplace(mesh.vertices);
   input_.mesh.normals = unit_normals(std::move(input_.mesh.normals));
   search_->normals = input_.mesh.normals.empty() ? estimated_normals(mesh.vertices, kNeighbors)

@@ -26,7 +26,7 @@ Cubes cubes_of(const TriangleMesh& cloud, double side) {
   for (const auto& p : cloud.vertices) box.extend(p.cast<double>());
   constexpr double kMostCubes = 1 << 21;
   require(box.isEmpty() || box.sizes().maxCoeff() / side < kMostCubes,
-          "cubes must be larger; along the longest side there may be 2097151, the number",
+          "the number of cubes along the longest side must be <= 2097151 (larger cubes are fewer)",
           box.sizes().maxCoeff() / side);
   Cubes out;
   out.of_point.reserve(cloud.vertices.size());
@@ -78,9 +78,8 @@ struct Sums {
 
 TriangleMesh down_sampled(const TriangleMesh& cloud, double side) {
   require(side > 0, "the side of a cube must be > 0", side);
-  require(cloud.faces.empty(),
-          "only point clouds can be thinned by cubes (meshes: simplify); the number of faces",
-          cloud.faces.size());
+  require(
+      cloud.faces.empty(), "the number of faces of what cubes thin must be 0", cloud.faces.size());
   const Cubes cubes = cubes_of(cloud, side);
   std::vector<uint8_t> only_sure(cubes.count, 0);
   for (size_t v = 0; v < cloud.vertices.size(); ++v) {

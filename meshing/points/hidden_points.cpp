@@ -23,7 +23,9 @@ double radius_for(double spacing, double farthest) {
 
 std::vector<uint8_t> seen_from(const std::vector<Eigen::Vector3f>& points,
                                const Eigen::Vector3d& eye) {
-  require(points.size() >= 4, "finding hidden points needs 4 points or more, found", points.size());
+  require(points.size() >= 4,
+          "the number of points to find hidden ones among must be >= 4",
+          points.size());
   double farthest = 0;
   for (const auto& p : points) farthest = std::max(farthest, (p.cast<double>() - eye).norm());
   const double radius = radius_for(point_spacing(points), farthest);

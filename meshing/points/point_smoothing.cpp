@@ -87,13 +87,15 @@ std::vector<std::optional<Fit>> fits(const TriangleMesh& cloud, size_t neighbors
 
 SmoothedPoints smoothed_points(const TriangleMesh& cloud, size_t neighbors) {
   constexpr size_t kLeast = 6;  // coefficients of the polynomial
-  require(neighbors >= kLeast, "smoothing points needs 6 neighbours or more; stated", neighbors);
+  require(
+      neighbors >= kLeast, "the number of neighbours to smooth points by must be >= 6", neighbors);
   require(cloud.faces.empty(),
-          "only points can be smoothed so; the number of faces",
+          "the number of faces of what is smoothed as points must be 0",
           cloud.faces.size());
-  require(cloud.vertices.size() >= neighbors,
-          "smoothing with " + std::to_string(neighbors) + " neighbours needs as many points; found",
-          cloud.vertices.size());
+  require(
+      cloud.vertices.size() >= neighbors,
+      "the number of points must be that of neighbours, " + std::to_string(neighbors) + ", or more",
+      cloud.vertices.size());
   const std::vector<std::optional<Fit>> fit = fits(cloud, neighbors);
   SmoothedPoints out;
   out.cloud = cloud;

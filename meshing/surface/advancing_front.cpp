@@ -172,9 +172,12 @@ void weaken_by_corners(TriangleMesh& mesh, const StatedSurface& source) {
 }  // namespace
 
 InterpolatedSurface advancing_front(const TriangleMesh& cloud, double max_edge) {
-  require(
-      cloud.faces.empty(), "only points can be joined; the number of faces", cloud.faces.size());
-  require(cloud.vertices.size() >= 3, "a surface needs 3 points, found", cloud.vertices.size());
+  require(cloud.faces.empty(),
+          "the number of faces of what is joined as points must be 0",
+          cloud.faces.size());
+  require(cloud.vertices.size() >= 3,
+          "the number of points of a surface must be >= 3",
+          cloud.vertices.size());
   require(max_edge > 0, "the longest edge must be > 0", max_edge);
   InterpolatedSurface out;
   std::vector<uint8_t> keep(cloud.vertices.size(), 0);

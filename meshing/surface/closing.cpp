@@ -389,7 +389,7 @@ class Closing {
 }  // namespace
 
 ClosedMesh closed_mesh(const TriangleMesh& mesh, const Progress& progress) {
-  require(!mesh.faces.empty(), "closing needs faces, their number", mesh.faces.size());
+  require(!mesh.faces.empty(), "the number of faces to close must be > 0", mesh.faces.size());
   Closing closing(mesh);
   bool done = closing.repair();
   report(progress, 0.1);

@@ -28,17 +28,17 @@ constexpr std::ptrdiff_t kLeast = 10;  // points with a normal
 
 void check_cloud(const TriangleMesh& cloud) {
   require(cloud.faces.empty(),
-          "Poisson's surface is made from points; the number of faces",
+          "the number of faces of what Poisson's surface is made from must be 0",
           cloud.faces.size());
   const auto known = std::count_if(cloud.normals.begin(), cloud.normals.end(), is_known_normal);
   require(known >= kLeast,
-          "Poisson's surface needs 10 points or more that state a normal, the number",
+          "the number of points that state a normal must be >= 10 for Poisson's surface",
           known);
 }
 
 double default_spacing(size_t points, double point_spacing) {
   constexpr double kAtFullDetail = 200'000;
-  require(point_spacing > 0, "most points lie in one place; their spacing", point_spacing);
+  require(point_spacing > 0, "the spacing of most points must be > 0", point_spacing);
   return point_spacing * std::max(1.0, std::sqrt(double(points) / kAtFullDetail));
 }
 

@@ -31,7 +31,7 @@ void check_size(const TriangleMesh& mesh, const WrapOptions& options) {
   const Eigen::Vector3d s = box.sizes() + Eigen::Vector3d::Constant(2 * options.offset);
   constexpr double kFinest = 1e-5;  // Float coordinates hold 6e-8 of the extent.
   require(options.offset >= kFinest * box.diagonal().norm(),
-          "the offset of a wrap must be at least 0.00001 of the diagonal; as a share of it",
+          "the offset of a wrap as a share of the diagonal must be >= 0.00001",
           options.offset / box.diagonal().norm());
   const double squares =
       2 * (s.x() * s.y() + s.y() * s.z() + s.z() * s.x()) / (options.alpha * options.alpha);

@@ -106,7 +106,7 @@ TEST_F(Filter, RefusesInOneLineAndWritesNothing) {
   refused("--op polish", 2, "there is no operation 'polish'; known are translate");
   refused("--op taubin=many", 2, "'many' is not a whole number in 1 ... 10000; write taubin=N");
   refused("--op simplify=3furlong", 2, "not a unit of length");
-  refused("--op voxel=1cm", 2, "only point clouds");
+  refused("--op voxel=1cm", 2, "--op voxel needs a point cloud, this mesh has");
   refused("--op crop-ball=0,0,9m,1cm", 6, "nothing is left");
   refused("--op merge=" + (dir_ / "none.ply").string(), 3, "none.ply");
   refused("--op merge=" + (dir_ / "no.ply").string(), 2, "lies in the input");
@@ -301,7 +301,8 @@ TEST_F(Filter, RefusesPointsOfWhichNoSurfaceCanBeMade) {
   for (const char* op : {"poisson", "advancing-front", "mls", "hidden-points=0,0,9m"}) {
     refused("ball.ply", op, "needs a point cloud, this mesh has 2976 faces");
   }
-  refused("cloud.ply", "mls=5000", "needs as many points");
+  refused(
+      "cloud.ply", "mls=5000", "--op mls=5000: the number of points must be that of neighbours");
   refused("cloud.ply", "mls=5", "'5' is not a whole number in 6 ... 10000");
   EXPECT_EQ(filter("bare.ply", "yes.ply", "-q --op normals --op poisson=4cm").exit_code, 0);
 }

@@ -21,6 +21,7 @@
 #include "libcgs/core/error.h"
 #include "meshing/edit/simplify.h"
 #include "meshing/mesh/components.h"
+#include "meshing/mesh/vertex_attributes.h"
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 #include "tests/support/temp_dir.h"
@@ -407,6 +408,39 @@ TEST(RunFilters, SaysWhichOperationLeftNothing) {
     EXPECT_NE(std::string(error.what()).find("crop-ball=500,0,0,1: nothing is left"),
               std::string::npos);
   }
+}
+
+// Each complaint is a sentence that names the operation as it was typed.
+TEST(RunFilters, SaysWhichOperationCannotBeDone) {
+  const auto words_of = [](FilterState state, const std::string& operation) -> std::string {
+    try {
+      filtered(std::move(state), operation, 2);
+    } catch (const InvalidInput& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const FilterState mesh = labelled_mesh();
+  const std::string faces = std::to_string(mesh.mesh.faces.size());
+  EXPECT_EQ(words_of(mesh, "voxel=2cm"),
+            "--op voxel needs a point cloud, this mesh has " + faces + " faces");
+  FilterState cloud = labelled_cloud();
+  const std::string many = words_of(cloud, "voxel=1e-9");
+  EXPECT_EQ(many.rfind("--op voxel=1e-9: the number of cubes along the longest side must be <= "
+                       "2097151 (larger cubes are fewer), but is ",
+                       0),
+            0U)
+      << many;
+  std::vector<uint8_t> keep(cloud.mesh.vertices.size(), 0);
+  keep[0] = 1;
+  cloud.mesh = with_vertices(cloud.mesh, keep);
+  EXPECT_EQ(words_of(cloud, "mls"),
+            "--op mls: the number of points must be that of neighbours, 24, or more, but is 1");
+  EXPECT_EQ(words_of(cloud, "hidden-points=0,0,9m"),
+            "--op hidden-points=0,0,9m: the number of points to find hidden ones among must be "
+            ">= 4, but is 1");
+  EXPECT_EQ(words_of(cloud, "advancing-front=1cm"),
+            "--op advancing-front=1cm: the number of points of a surface must be >= 3, but is 1");
 }
 
 TEST(PrepareFilters, RefusesWhatItDoesNotKnowBeforeAnythingRuns) {
