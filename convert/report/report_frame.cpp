@@ -127,7 +127,7 @@ std::string scale_section(const Json& report) {
   html << "<h2>Scale</h2>\n<p>" << scale_words(report)
        << " (one standard deviation).</p>\n<table>\n<tr><th>known distance</th><th>known "
           "[m]</th><th>measured [m]</th>"
-          "<th>sigma</th><th>residual</th><th>used</th></tr>\n";
+          "<th>sigma [m]</th><th>residual [m]</th><th>used</th></tr>\n";
   for (const Json& d : scale["distances"]) {
     html << "<tr><td>" << escaped(d["distance"].get<std::string>()) << "</td><td>"
          << number(d["known"], "%.6g") << "</td><td>" << number(d["measured"], "%.6g")
