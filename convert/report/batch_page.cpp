@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <sstream>
-#include <string_view>
 
 #include "convert/model/model_training.h"
 #include "convert/report/page_files.h"
 #include "convert/text/figures.h"
 #include "convert/text/html.h"
 #include "io/bytes/atomic_file.h"
+#include "io/bytes/percent_encoding.h"
 #include "libcgs/core/provenance.h"
 
 namespace cgs {
@@ -46,23 +46,7 @@ size_t input_count(const Json& report) {
 }
 
 // A path below the folder of the page as an address in it.
-// Source: RFC 3986, 2.3: what stands for itself.
-std::string address(const std::string& path) {
-  static constexpr std::string_view kPlain = "-._~/";
-  std::ostringstream out;
-  out << std::hex << std::uppercase;
-  for (const char c : path) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool is_plain = (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') ||
-                          (c >= 'a' && c <= 'z') || kPlain.find(c) != std::string_view::npos;
-    if (is_plain) {
-      out << c;
-    } else {
-      out << '%' << (byte >> 4) << (byte & 15);
-    }
-  }
-  return out.str();
-}
+std::string address(const std::string& path) { return percent_encoded(path, PlainBytes::InPaths); }
 
 // The picture of the first input view, as a path below the folder.
 std::string thumbnail(const BatchResult& result) {

@@ -11,10 +11,16 @@ TEST(PercentEncoding, LeavesNothingBeyondAscii) {
   EXPECT_EQ(percent_encoded("f\xC3\xBCllung_100%.png"), "f%C3%BCllung_100%25.png");
 }
 
+TEST(PercentEncoding, LeavesInAnAddressWhatStandsForItself) {
+  EXPECT_EQ(percent_encoded("my vase#2?/f\xC3\xBC_r-1.~png", PlainBytes::InPaths),
+            "my%20vase%232%3F/f%C3%BC_r-1.~png");
+}
+
 TEST(PercentEncoding, IsUndoneForEveryByte) {
   std::string all;
   for (int byte = 0; byte < 256; ++byte) all += static_cast<char>(byte);
   EXPECT_EQ(percent_decoded(percent_encoded(all)), all);
+  EXPECT_EQ(percent_decoded(percent_encoded(all, PlainBytes::InPaths)), all);
 }
 
 TEST(PercentEncoding, LeavesAPercentSignThatEncodesNothing) {
