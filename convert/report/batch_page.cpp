@@ -110,8 +110,9 @@ void write_batch_page(const std::filesystem::path& folder,
   std::ostringstream html;
   const auto failed = std::count_if(
       results.begin(), results.end(), [](const BatchResult& r) { return !r.failure.empty(); });
-  html << "<!DOCTYPE html>\n<html lang=en><meta charset=utf-8><title>" << results.size()
-       << " scenes</title>\n<style>" << page_files().style << "</style>\n<h1>"
+  html << "<!DOCTYPE html>\n<html lang=en><meta charset=utf-8>"
+          "<meta name=viewport content=\"width=device-width,initial-scale=1\"><title>"
+       << results.size() << " scenes</title>\n<style>" << page_files().style << "</style>\n<h1>"
        << results.size() - size_t(failed) << " of " << results.size() << " scenes</h1>\n"
        << "<p>Measured: of what the input photographs show of surface. Observed and invented: of "
           "the area of the closed mesh. PSNR: of held-out photographs.</p>\n<table>\n<tr><th></th>"

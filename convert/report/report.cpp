@@ -188,7 +188,8 @@ std::string coverage_section(const Json& model) {
           "place is "
           "in no other picture, or something is before it there; the photograph shows no texture; "
           "others see it at more than 40 degrees; or what matches is not confirmed from the other "
-          "side, as where a pattern repeats, a surface shines, or cameras are off.</p>\n<table>\n"
+          "side, as where a pattern repeats, a surface shines, or cameras are off.</p>\n<div "
+          "class=scrolling><table>\n"
           "<tr><th>view</th><th>matched</th><th>measured</th><th>sky</th><th>moved</th>"
           "<th>estimated</th><th>open</th><th>in no other</th><th>hidden</th><th>no texture</th>"
           "<th>wide angle</th><th>not confirmed</th></tr>\n";
@@ -212,7 +213,7 @@ std::string coverage_section(const Json& model) {
     }
     html << "</tr>\n";
   }
-  html << "</table>\n";
+  html << "</table></div>\n";
   return html.str();
 }
 

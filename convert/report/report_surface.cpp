@@ -26,6 +26,11 @@ class ShownUnit {
     factor_ = has_name ? 1 : metres;
     name_ = units == "unknown" ? "units" : has_name ? units : "m";
   }
+  std::string name() const { return escaped(name_); }
+  /// A length where the unit stands elsewhere.
+  std::string figure(const Json& value) const {
+    return value.is_number() ? number(factor_ * value.get<double>()) : "-";
+  }
   std::string length(const Json& value) const { return power(value, 1, ""); }
   std::string area(const Json& value) const { return power(value, 2, "<sup>2</sup>"); }
   std::string volume(const Json& value) const { return power(value, 3, "<sup>3</sup>"); }
@@ -34,8 +39,7 @@ class ShownUnit {
   // "-" for what is not stated.
   std::string power(const Json& value, int exponent, const char* written) const {
     if (!value.is_number()) return "-";
-    return number(std::pow(factor_, exponent) * value.get<double>()) + " " + escaped(name_) +
-           written;
+    return number(std::pow(factor_, exponent) * value.get<double>()) + "&nbsp;" + name() + written;
   }
   double factor_ = 1;
   std::string name_;
@@ -45,7 +49,7 @@ class ShownUnit {
 std::string deviation_cells(const Json& figures, const ShownUnit& unit) {
   std::string out;
   for (const char* key : {"max", "rms", "p95"}) {
-    out += "<td>" + (figures.is_null() ? "-" : unit.length(figures[key])) + "</td>";
+    out += "<td>" + (figures.is_null() ? "-" : unit.figure(figures[key])) + "</td>";
   }
   return out;
 }
@@ -151,10 +155,10 @@ std::string deviation_section(const Json& report) {
       << samples
       << " samples of each surface. Bars: 95 % lie within, from the step before (upper) and from "
          "measured depth (lower).</p>\n<div class=scrolling><table>\n"
-         "<tr><th rowspan=2>step</th><th rowspan=2>against</th><th colspan=3>seen surface</th>"
-         "<th colspan=3>inferred or estimated surface</th><th colspan=3>measured depth to this "
-         "step</th>"
-         "<th rowspan=2></th></tr>\n<tr>"
+         "<tr><th rowspan=2>step</th><th rowspan=2>against</th><th colspan=3>seen surface ["
+      << unit.name() << "]</th><th colspan=3>inferred or estimated surface [" << unit.name()
+      << "]</th><th colspan=3>measured depth to this step [" << unit.name()
+      << "]</th><th rowspan=2></th></tr>\n<tr>"
          "<th>max</th><th>RMS</th><th>95 %</th><th>max</th><th>RMS</th><th>95 %</th>"
          "<th>max</th><th>RMS</th><th>95 %</th></tr>\n";
   for (const Json& s : steps) {

@@ -193,6 +193,12 @@ class ReportPage(unittest.TestCase):
         for address in requests:
             self.assertRegex(address, r'^(file:///.*report\.html$|data:)')
 
+    def test_shows_every_column_of_every_table(self):
+        hidden = self.page.driver.execute_script('''
+            return [...document.querySelectorAll('table, .scrolling')].filter(
+              (table) => table.scrollWidth > table.clientWidth).map((table) => table.innerText);''')
+        self.assertEqual(hidden, [])
+
     def test_every_look_is_another_picture(self):
         pictures = {}
         for look in ('Photographs', 'Colour', 'Provenance', 'Sigma', 'Gaussians'):
@@ -465,6 +471,12 @@ class OtherBrowsers(unittest.TestCase):
         page.touch(0)
         self.assertIn('Pick the second point', page.measured())
         page.driver.save_screenshot(str(SCREENS / 'phone_touched.png'))
+
+    def test_large_screen(self):
+        page = self.open('large', '--window-size=3840,2160')
+        self.assertEqual(page.state(), 'ready')
+        self.assertGreater(page.canvas().size['width'], 2000)
+        self.assertGreater(page.canvas().size['height'], 1200)
 
     def test_comes_back_after_the_graphics_context_was_lost(self):
         page = self.open('context')

@@ -36,13 +36,13 @@ bool has(const std::string& html, const std::string& text) {
 
 TEST(CertificateSection, ShowsEveryAreaInTheUnitOfTheFiles) {
   const std::string html = certificate_section(report_of("mm", 0.001));
-  EXPECT_TRUE(has(html, "<td>volume</td><td>2 mm<sup>3</sup></td>")) << html;
-  EXPECT_TRUE(has(html, "<td>area seen by one view</td><td>4 mm<sup>2</sup></td>")) << html;
+  EXPECT_TRUE(has(html, "<td>volume</td><td>2&nbsp;mm<sup>3</sup></td>")) << html;
+  EXPECT_TRUE(has(html, "<td>area seen by one view</td><td>4&nbsp;mm<sup>2</sup></td>")) << html;
 }
 
 TEST(CertificateSection, IsInMetresWhereTheUnitHasNoName) {
   const std::string html = certificate_section(report_of("0.5 m", 0.5));
-  EXPECT_TRUE(has(html, "<td>volume</td><td>0.25 m<sup>3</sup></td>")) << html;
+  EXPECT_TRUE(has(html, "<td>volume</td><td>0.25&nbsp;m<sup>3</sup></td>")) << html;
 }
 
 TEST(CertificateSection, HasADashForWhatRunsOfEarlierVersionsDoNotState) {
@@ -50,7 +50,7 @@ TEST(CertificateSection, HasADashForWhatRunsOfEarlierVersionsDoNotState) {
   report["certificate"].erase("area_estimated");
   const std::string html = certificate_section(report);
   EXPECT_TRUE(has(html, "measured by nothing)</td><td>-</td>")) << html;
-  EXPECT_TRUE(has(html, "<td>7 m<sup>2</sup></td>")) << html;
+  EXPECT_TRUE(has(html, "<td>7&nbsp;m<sup>2</sup></td>")) << html;
 }
 
 }  // namespace
