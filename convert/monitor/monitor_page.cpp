@@ -111,9 +111,9 @@ WorldPlaces world_places(const MeasurableMesh& earlier) {
 std::string table_of(const Json& side, const std::string& unit, const WorldPlaces& places) {
   const char* const format = places.format.c_str();
   std::ostringstream html;
-  html << "<table>\n<tr><th></th><th>area [" << unit << "²]</th><th>stands out by [" << unit
-       << "]</th><th>volume [" << unit << "³]</th><th>in the middle: x, y, z [" << places.unit
-       << "]</th></tr>\n";
+  html << "<div class=scrolling><table>\n<tr><th></th><th>area [" << unit
+       << "²]</th><th>stands out by [" << unit << "]</th><th>volume [" << unit
+       << "³]</th><th>in the middle: x, y, z [" << places.unit << "]</th></tr>\n";
   int number_of_row = 0;
   for (const Json& patch : side["patches"]) {
     const Json& center = patch["center"];
@@ -125,7 +125,7 @@ std::string table_of(const Json& side, const std::string& unit, const WorldPlace
          << "</td><td>" << number(center[0], format) << ", " << number(center[1], format) << ", "
          << number(center[2], format) << "</td></tr>\n";
   }
-  html << "</table>\n";
+  html << "</table></div>\n";
   return html.str();
 }
 
@@ -136,11 +136,11 @@ std::string side_of(const char* title,
                     const WorldPlaces& places) {
   std::ostringstream html;
   html << "<h2><span style=\"color:" << color << "\">■</span> " << title << "</h2>\n<p>"
-       << side["patches"].size() << " pieces, " << number(side["area"], "%.3g") << " " << unit
-       << "², volume " << number(side["volume"], "%.3g") << " ± "
-       << number(side["volume_sigma"], "%.2g") << " " << unit << "³; told from "
-       << number(side["detection"], "%.2g") << " " << unit << " on (median, 95 %), at "
-       << percent(side["comparable"]) << " of the surface.</p>\n";
+       << side["patches"].size() << (side["patches"].size() == 1 ? " piece, " : " pieces, ")
+       << number(side["area"], "%.3g") << " " << unit << "², volume "
+       << number(side["volume"], "%.3g") << " ± " << number(side["volume_sigma"], "%.2g") << " "
+       << unit << "³; told from " << number(side["detection"], "%.2g") << " " << unit
+       << " on (median, 95 %), at " << percent(side["comparable"]) << " of the surface.</p>\n";
   if (!side["patches"].empty()) html << table_of(side, unit, places);
   return html.str();
 }

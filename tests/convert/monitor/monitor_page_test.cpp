@@ -80,6 +80,12 @@ TEST(MonitorPage, SaysHowTheDatesWereLaidOntoEachOther) {
   EXPECT_FALSE(has(registered, "agree on one motion")) << registered;
 }
 
+TEST(MonitorPage, CountsPieces) {
+  const std::string html = page_of(0, site());
+  EXPECT_TRUE(has(html, "<p>1 piece, 2.5 m²")) << html;
+  EXPECT_TRUE(has(html, "<p>0 pieces, 0 m²")) << html;
+}
+
 TEST(MonitorPage, HasADashWhereChangeIsToldAtNoPlace) {
   EXPECT_TRUE(has(page_of(0, site()), "told from - m on"));
 }
