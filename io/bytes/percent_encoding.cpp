@@ -12,7 +12,7 @@ int hex_digit(char c) {
   return -1;
 }
 
-bool is_plain(char c, PlainBytes plain) {
+bool stays(char c, PlainBytes plain) {
   if (plain == PlainBytes::Ascii) return static_cast<unsigned char>(c) < 0x80 && c != '%';
   constexpr std::string_view kMarks = "-._~/";
   return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
@@ -25,7 +25,7 @@ std::string percent_encoded(std::string_view text, PlainBytes plain) {
   constexpr std::string_view kDigits = "0123456789ABCDEF";
   std::string out;
   for (const char c : text) {
-    if (is_plain(c, plain)) {
+    if (stays(c, plain)) {
       out += c;
     } else {
       const auto byte = static_cast<unsigned char>(c);
