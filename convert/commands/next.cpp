@@ -109,7 +109,10 @@ std::vector<NextView> candidates(const NextArgs& args, const Model& model) {
 void run_next(const NextArgs& args) {
   limit_threads(args.common.threads);
   Terminal terminal(args.common.quiet, args.common.strict);
-  if (!args.output.empty()) keep_apart(args.output, args.model);
+  if (!args.output.empty()) {
+    keep_apart(args.output, args.model);
+    refuse_to_replace_path(args.output, args.cameras);
+  }
   const Model model = read_model(args.model);
   std::vector<NextView> ranked =
       rank_next_views(model, candidates(args, model), terminal.begin("looking around"));

@@ -65,11 +65,7 @@ void run_render(const RenderArgs& args) {
   }
   if (!args.path.empty()) {
     const bool is_file = lower_extension(args.path) == ".json";
-    std::error_code ignored;
-    if (is_file && std::filesystem::equivalent(args.path, args.output / "cameras.json", ignored)) {
-      throw InvalidInput("--path: " + printable(args.path) +
-                         " would be replaced by the cameras of the frames; choose another folder");
-    }
+    refuse_to_replace_path(args.output, is_file ? args.path : std::string());
     if (is_file && args.frames) {
       throw InvalidInput("--frames is for spiral and orbit; " + printable(args.path) +
                          " says which cameras there are");

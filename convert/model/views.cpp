@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -166,21 +167,39 @@ std::vector<std::string> pictures_of_frame(size_t k) {
   return {frame_name(k) + ".png", frame_name(k) + ".hole.png", frame_name(k) + ".painted.png"};
 }
 
-// Pictures of an earlier path: those of a longer one must not follow the new ones.
-// \throws InvalidInput if pictures lie there whose cameras.json does not
-void remove_frames(const std::filesystem::path& folder) {
-  size_t earlier = 0;
-  try {
-    if (is_present(folder / "cameras.json")) {
-      earlier = read_cameras_json(folder / "cameras.json").views.size();
-    }
-  } catch (const Error&) {
-    earlier = 0;  // of another program
+// Whether cameras are those of an earlier path: views of models have photographs, pictures of holes
+// and of other programs have other names.
+bool are_of_path(const Scene& scene) {
+  if (!scene.input.empty() || !scene.held_out.empty()) return false;
+  for (size_t k = 0; k < scene.views.size(); ++k) {
+    if (scene.views[k].name != frame_name(k) || !scene.views[k].image_path.empty()) return false;
   }
-  if (earlier == 0 && is_present(folder / pictures_of_frame(0).front())) {
+  return true;
+}
+
+// Number of pictures of an earlier path.
+// \throws InvalidInput if what lies there is of something else
+size_t earlier_frames(const std::filesystem::path& folder) {
+  const std::filesystem::path cameras = folder / "cameras.json";
+  if (!is_present(cameras)) {
+    if (!is_present(folder / pictures_of_frame(0).front())) return 0;
     throw InvalidInput(printable(folder) + " holds frame_0000.png but not the cameras.json that " +
                        "would go with it: choose another folder, or remove the frames");
   }
+  try {
+    const Scene earlier = read_cameras_json(cameras);
+    if (are_of_path(earlier)) return earlier.views.size();
+  } catch (const Error&) {
+    // of another program, as told below
+  }
+  throw InvalidInput(printable(cameras) +
+                     " is not of frames along a path, and their cameras would replace it; choose "
+                     "another folder");
+}
+
+// Those of a longer path must not follow the new ones.
+void remove_frames(const std::filesystem::path& folder) {
+  const size_t earlier = earlier_frames(folder);
   for (size_t k = 0; k < earlier; ++k) {
     for (const std::string& name : pictures_of_frame(k)) std::filesystem::remove(folder / name);
   }
@@ -250,15 +269,25 @@ std::vector<RenderedPicture> write_views(const Model& model,
   return out;
 }
 
+void refuse_to_replace_path(const std::filesystem::path& folder,
+                            const std::filesystem::path& wanted) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(wanted, folder / "cameras.json", ignored)) {
+    throw InvalidInput(printable(wanted) +
+                       " would be replaced by the cameras of the frames; choose another folder");
+  }
+  (void)earlier_frames(folder);
+}
+
 std::vector<RenderedPicture> write_path(const Model& model,
                                         const std::vector<Camera>& path,
                                         const std::filesystem::path& folder,
                                         const Progress& progress,
                                         const PictureOptions& shown) {
   make_output_folder(folder);
+  remove_frames(folder);
   const std::vector<SupportView> inputs = support_views(model);
   const ModelPictures pictures(model, shown);
-  remove_frames(folder);
   write_cameras_json(folder / "cameras.json", scene_of_cameras(model, path, frame_name));
   constexpr size_t kOnSheet = 12;
   const auto place_on_sheet = [&](size_t k) { return k * kOnSheet / path.size(); };

@@ -65,10 +65,18 @@ std::vector<RenderedPicture> write_views(const Model& model,
                                          const Progress& progress,
                                          const PictureOptions& shown = {});
 
+/// Whether write_path() may write to a folder, before anything is drawn: a cameras.json there must
+/// be of an earlier path.
+/// \param wanted  file that the path is from, which must not be replaced; may be empty
+/// \throws InvalidInput
+void refuse_to_replace_path(const std::filesystem::path& folder,
+                            const std::filesystem::path& wanted);
+
 /// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
 /// says where they are, and contact.png: twelve of them, holes in magenta, in violet where
 /// Model::fill shows, of which frame_0000.painted.png is the mask where the model has one. Without
 /// priors there are no masks of holes and no magenta. What is returned has no roles.
+/// \throws InvalidInput as refuse_to_replace_path()
 std::vector<RenderedPicture> write_path(const Model& model,
                                         const std::vector<Camera>& path,
                                         const std::filesystem::path& folder,

@@ -11,6 +11,8 @@
 #include "io/images/exr.h"
 #include "io/images/image.h"
 #include "io/images/png.h"
+#include "io/scenes/cameras_json.h"
+#include "libcgs/core/error.h"
 #include "tests/support/exr_channel.h"
 #include "tests/support/grey_model.h"
 #include "tests/support/splat_shapes.h"
@@ -40,6 +42,33 @@ TEST(WriteViews, WritesHolesWhereTheyAreKnownAlone) {
     EXPECT_EQ(std::filesystem::exists(dir / "path" / "frame_0000.hole.png"), is_known);
     EXPECT_TRUE(std::filesystem::exists(dir / "views" / "0.color.png"));
     EXPECT_TRUE(std::filesystem::exists(dir / "path" / "frame_0000.png"));
+  }
+}
+
+TEST(WritePath, ReplacesAnEarlierPathAndNothingElse) {
+  const test::TempDir dir;
+  Model model = model_of_greys(dir, 2);
+  say_that_it_saw_nothing(model, 0);
+  const Camera& camera = model.scene.views[0].camera;
+  const std::filesystem::path file = dir / "path" / "cameras.json";
+  write_path(model, {camera, camera, camera}, dir / "path", {});
+  write_path(model, {camera, camera}, dir / "path", {});
+  EXPECT_TRUE(std::filesystem::exists(dir / "path" / "frame_0001.png"));
+  EXPECT_FALSE(std::filesystem::exists(dir / "path" / "frame_0002.png"));
+  EXPECT_NO_THROW(refuse_to_replace_path(dir / "path", {}));
+  EXPECT_THROW(refuse_to_replace_path(dir / "path", file), InvalidInput) << "its own cameras";
+
+  write_cameras_json(file, model.scene);  // as a finished model has it
+  const std::string of_model = test::read_bytes(file);
+  const std::string holes =
+      R"([{"id": 0, "img_name": "hole_1", "width": 4, "height": 4, "position": [0, 0, 0],
+           "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "fx": 4, "fy": 4}])";
+  for (const std::string& others : {of_model, holes, std::string("of another program")}) {
+    test::write_bytes(file, others);
+    EXPECT_THROW(refuse_to_replace_path(dir / "path", {}), InvalidInput);
+    EXPECT_THROW(write_path(model, {camera}, dir / "path", {}), InvalidInput);
+    EXPECT_EQ(test::read_bytes(file), others);
+    EXPECT_TRUE(std::filesystem::exists(dir / "path" / "frame_0001.png"));
   }
 }
 
