@@ -14,6 +14,7 @@
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/json_file.h"
 #include "io/bytes/scene_path.h"
+#include "io/scenes/photographs.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/view_groups.h"
@@ -37,15 +38,26 @@ std::string group_name(size_t i, size_t count) {
   return "group_" + std::string(std::to_string(count).size() - number.size(), '0') + number;
 }
 
+void require_listable(const std::string& name) {
+  if (is_listable(name)) return;
+  throw InvalidInput("photograph " + printable(name) +
+                     " has a comma in its name, which ends a name in --views; rename it");
+}
+
 // Names as --views takes them.
 std::vector<std::string> listable_names(const std::vector<int>& views, const Scene& scene) {
   std::vector<std::string> out = view_names(scene, views);
-  for (const std::string& name : out) {
-    if (is_listable(name)) continue;
-    throw InvalidInput("photograph " + printable(name) +
-                       " has a comma in its name, which ends a name in --views; rename it");
-  }
+  for (const std::string& name : out) require_listable(name);
   return out;
+}
+
+// Before minutes are spent on cameras.
+void refuse_unlistable(const SceneRequest& request) {
+  if (!request.options.views.empty() || !is_photographs(request.path)) return;
+  for (const PhotoFile& photograph :
+       list_photographs({request.path, request.options.allow_external})) {
+    require_listable(photograph.path.filename().string());
+  }
 }
 
 Json groups_json(const std::vector<ViewGroup>& groups, const SplitArgs& args, const Scene& scene) {
@@ -81,6 +93,8 @@ void run_split(const SplitArgs& args) {
   Terminal terminal(args.common.quiet, args.common.strict);
   SceneRequest request = args.scene;
   if (request.options.views.empty()) request.options.all_views = true;
+  const NewFolder folder(args.output);
+  refuse_unlistable(request);
   const OpenedScene opened = open_scene(request, {}, terminal);
   terminal.warn(opened.scene.warnings);
   const Json groups = groups_json(group_views(opened.scene, args.size), args, opened.scene);

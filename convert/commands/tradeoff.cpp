@@ -12,6 +12,7 @@
 #include "convert/text/length.h"
 #include "convert/text/report_json.h"
 #include "convert/tradeoff/tradeoff_report.h"
+#include "io/bytes/atomic_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -47,6 +48,7 @@ void run_tradeoff(const TradeoffArgs& args) {
   request.memory_limit = stated_memory_limit(args.common);
   request.threads = args.common.threads;
   Terminal terminal(args.common.quiet, args.common.strict);
+  const NewFolder folder(request.output);
   const CostMeter meter;
   const OpenedScene opened = open_scene(request.scene, request.output, terminal);
   const StageCost opening = meter.read();

@@ -62,13 +62,16 @@ void run_train(const TrainArgs& args) {
       [&](const std::string& words) { checkpoint_warnings.push_back(words); },
       args.medium,
       args.start};
-  OpenedScene opened = open_scene(args.scene, args.output, terminal);
-  check_training_memory(
-      opened.scene, memory_budget(stated_memory_limit(args.common)), request.training);
-  (void)check_stated_cameras(opened, terminal);
+  const size_t budget = memory_budget(stated_memory_limit(args.common));
   const NewFolder folder(args.output);
   const FolderLock lock(args.output);
   refuse_to_replace_model(args.output, args.overwrite);  // another start may have ended since
+  OpenedScene opened =
+      open_scene(args.scene, args.output, terminal, [&](const OpenedScene& solved) {
+        solved.keep(args.output);  // whatever is refused later
+      });
+  check_training_memory(opened.scene, budget, request.training);
+  (void)check_stated_cameras(opened, terminal);
   remove_abandoned_files(args.output);
   opened.keep(args.output);
   Scene& scene = opened.scene;

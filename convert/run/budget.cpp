@@ -369,7 +369,7 @@ RunRequest within_budget(const RunRequest& request,
   if (request.scene.options.downscale) {
     throw InvalidInput("--budget chooses the size of the pictures; give it or --downscale");
   }
-  const OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
+  const OpenedScene opened = open_scene_of(request, terminal);
   RunRequest full = request;
   full.scene.options.views = views_of_run(request, opened.scene);
   full.scene.options.downscale = 1;

@@ -11,8 +11,6 @@
 #include "convert/model/memory_plan.h"
 #include "convert/run/disk_plan.h"
 #include "convert/run/pipeline.h"
-#include "io/bytes/atomic_file.h"
-#include "io/bytes/scene_path.h"
 #include "io/scenes/view_names.h"
 
 namespace cgs {
@@ -21,14 +19,7 @@ using Json = nlohmann::ordered_json;
 
 Json forecast(const RunRequest& request, Terminal& terminal) {
   refuse_contradictions(request);
-  const OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
-  const Scene& scene = opened.scene;
-  const bool is_run = is_present(request.output / "run.json");  // which has cameras of its own
-  if (opened.poses && !opened.poses->is_stored && !is_run) {
-    make_output_folder(request.output / "model");
-    const FolderLock lock(request.output);
-    opened.keep(request.output / "model");
-  }
+  const Scene scene = open_scene_of(request, terminal).scene;
   terminal.note(scene.notes);
   terminal.warn(scene.warnings);
   Json memory = Json::object();

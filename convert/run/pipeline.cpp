@@ -405,7 +405,8 @@ FinishedRun run_pipeline(const RunRequest& request,
                          const FirstLook& first_look) {
   refuse_contradictions(request);
   check_lengths_of_photographs(request);
-  OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
+  if (!request.overwrite) refuse_foreign_files(request.output, stage_files({}, request.lods));
+  OpenedScene opened = open_scene_of(request, terminal);
   Scene& scene = opened.scene;
   terminal.note(scene.notes);
   terminal.warn(scene.warnings);

@@ -99,7 +99,7 @@ std::string main_reason(const Json& depth_of_views) {
 }  // namespace
 
 Json write_preview(const RunRequest& request, Terminal& terminal) {
-  const OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
+  const OpenedScene opened = open_scene_of(request, terminal);
   make_output_folder(request.output);
   const FolderLock lock(request.output);
   const std::filesystem::path model = model_of_preview(request, opened);

@@ -8,6 +8,8 @@
 
 #include "convert/model/simplification.h"
 #include "convert/text/length.h"
+#include "io/bytes/atomic_file.h"
+#include "io/bytes/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -19,6 +21,18 @@ PictureWork picture_work(const RunRequest& request) {
           .coherence = request.training.coherence,
           .method = request.training.method,
           .match_lists = match_lists(request.training)};
+}
+
+OpenedScene open_scene_of(const RunRequest& request, Terminal& terminal) {
+  const std::filesystem::path model = request.output / "model";
+  std::optional<NewFolder> folder;
+  if (needs_cameras(request.scene)) folder.emplace(request.output);
+  return open_scene(request.scene, model, terminal, [&](const OpenedScene& solved) {
+    if (is_present(request.output / "run.json")) return;
+    make_output_folder(model);
+    const FolderLock lock(request.output);
+    solved.keep(model);
+  });
 }
 
 void check_lengths(const RunRequest& request, Frame frame) {

@@ -43,6 +43,11 @@ inline constexpr size_t kMostLods = 5;
 /// What of a request decides how much memory its run takes.
 PictureWork picture_work(const RunRequest& request);
 
+/// Opens the scene of a run. Cameras that took minutes are stored at once, so that what is refused
+/// later costs them no second time; not where a run is, which has cameras of its own.
+/// \throws IoError before they are solved for where they could not be stored; as open_scene()
+OpenedScene open_scene_of(const RunRequest& request, Terminal& terminal);
+
 /// Refuses promises that contradict other settings.
 /// \throws InvalidInput naming both options
 void refuse_contradictions(const RunRequest& request);

@@ -36,18 +36,23 @@ double pixel_number(const std::string& text, const std::string& pick) {
   return value;
 }
 
-KnownDistance::Pick pick_of(const std::string& text, const Scene& scene) {
+// Whose pixel may lie outside of its photograph.
+KnownDistance::Pick typed_pick(const std::string& text, const Scene& scene) {
   const size_t colon = text.rfind(':');
   const size_t comma = text.find(',', colon == std::string::npos ? 0 : colon);
   if (colon == std::string::npos || comma == std::string::npos) refuse_pick(text);
   KnownDistance::Pick pick;
-  const std::string name = text.substr(0, colon);
-  pick.view = find_view(scene, name, "--known-distance");
+  pick.view = find_view(scene, text.substr(0, colon), "--known-distance");
   pick.x = pixel_number(text.substr(colon + 1, comma - colon - 1), text);
   pick.y = pixel_number(text.substr(comma + 1), text);
+  return pick;
+}
+
+KnownDistance::Pick pick_of(const std::string& text, const Scene& scene) {
+  KnownDistance::Pick pick = typed_pick(text, scene);
   const View& view = scene.views[static_cast<size_t>(pick.view)];
   if (std::find(scene.input.begin(), scene.input.end(), pick.view) == scene.input.end()) {
-    throw InvalidInput("--known-distance: view " + printable(name) +
+    throw InvalidInput("--known-distance: view " + printable(text.substr(0, text.rfind(':'))) +
                        " is held out, so no depth is measured there; pick in an input view");
   }
   const auto at = picked_pixel(view, {pick.x, pick.y});
@@ -216,6 +221,14 @@ std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typ
     out.push_back(std::move(distance));
   }
   return out;
+}
+
+void check_known_distances(const std::vector<DistanceWords>& typed, const Scene& named) {
+  for (const DistanceWords& words : typed) {
+    (void)typed_pick(words[0], named);
+    (void)typed_pick(words[1], named);
+    (void)parse_metres_with_sigma(words[2]);
+  }
 }
 
 void check_picks(const std::vector<KnownDistance>& distances, const Model& model) {

@@ -54,6 +54,11 @@ struct DistanceScale {
 std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typed,
                                            const Scene& scene);
 
+/// Whether distances can be read and their views exist, before their cameras are known.
+/// \param named  all photographs, by their names
+/// \throws InvalidInput
+void check_known_distances(const std::vector<DistanceWords>& typed, const Scene& named);
+
 /// Whether depth was measured where every distance ends: known before the training.
 /// \throws InvalidInput as scale_by()
 void check_picks(const std::vector<KnownDistance>& distances, const Model& model);

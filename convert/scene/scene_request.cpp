@@ -6,7 +6,9 @@
 
 #include "convert/model/model.h"
 #include "convert/scene/baselines.h"
+#include "convert/text/length.h"
 #include "convert/text/stated_frame.h"
+#include "io/scenes/control_points.h"
 #include "io/scenes/photographs.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
@@ -57,21 +59,44 @@ void expect_old_photographs(Scene& scene) {
 }
 
 // Which photographs there are is known before their cameras are, minutes earlier.
-// \return the names that a list stands for: indices are those of all photographs, also where some
-//         cannot be placed
-std::vector<std::string> names_of(const SceneRoot& root, const std::string& views) {
-  std::vector<std::string> out;
-  if (views.empty()) return out;
+Scene named_photographs(const SceneRoot& root) {
   Scene named;
   for (const PhotoFile& photograph : list_photographs(root)) {
     View& view = named.views.emplace_back();
-    view.name = photograph.path.stem().string();
+    view.name = photograph.path.filename().string();
     view.image_path = photograph.path;
   }
+  name_views(named);
+  return named;
+}
+
+// \return the names that a list stands for: indices are those of all photographs, also where some
+//         cannot be placed
+std::vector<std::string> names_of(const Scene& named, const std::string& views) {
+  std::vector<std::string> out;
+  if (views.empty()) return out;
   for (const int i : select_views(named, views)) {
-    out.push_back(named.views[static_cast<size_t>(i)].image_path.filename().string());
+    const std::string name = named.views[static_cast<size_t>(i)].image_path.filename().string();
+    if (!is_listable(name)) {
+      throw InvalidInput("--views: photograph " + printable(name) +
+                         " has a comma in its name, which ends a name there; rename it");
+    }
+    out.push_back(name);
   }
   return out;
+}
+
+// What was typed and cannot be meant is refused before minutes are spent on cameras.
+void check_words(const SceneRequest& request) {
+  require(request.focal >= 0 && std::isfinite(request.focal),
+          "--focal must be a number of pixels above 0",
+          request.focal);
+  if (!request.assume_unit.empty()) (void)metres_in(request.assume_unit);
+  if (!request.up.empty()) (void)up_direction(request.up);
+  if (!request.marker_size.empty()) (void)parse_metres_with_sigma(request.marker_size);
+  if (request.control.file.empty()) return;
+  if (!request.control.unit.empty()) (void)metres_in(request.control.unit);
+  (void)read_control_points(request.control.file);
 }
 
 // The same views among those that could be placed. \throws InvalidInput if one could not
@@ -85,12 +110,60 @@ std::string placed_views(const std::vector<std::string>& names, const ColmapMode
       throw InvalidInput("--views: photograph " + printable(name) +
                          " could not be placed: too little of what it shows is in the others");
     }
-    if (!is_listable(name)) {
-      throw InvalidInput("--views: photograph " + printable(name) +
-                         " has a comma in its name, which ends a name there; rename it");
-    }
   }
   return view_list(names);
+}
+
+// A scene of photographs alone.
+void solve(const SceneRequest& request,
+           const std::filesystem::path& model,
+           Terminal& terminal,
+           const Solved& solved,
+           OpenedScene& out) {
+  if (request.refine_poses) {
+    throw InvalidInput("--refine-poses is for cameras that a scene states; " +
+                       printable(request.path) +
+                       " holds photographs alone, which are solved for as well as they can be");
+  }
+  if (!request.options.chunk.empty()) {
+    throw InvalidInput("--chunk is for cameras of Metashape; " + printable(request.path) +
+                       " holds photographs alone");
+  }
+  request.options.validate();
+  const SceneRoot root{request.path, request.options.allow_external};
+  const Scene named = named_photographs(root);
+  const std::vector<std::string> names = names_of(named, request.options.views);
+  check_known_distances(request.known_distances, named);
+  const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
+  const PhotoPoseOptions how{
+      request.focal, request.each_lens, request.old_photographs, request.options.all_views};
+  out.poses = photo_poses(root, names, how, stored, terminal);
+  if (solved && !out.poses->is_stored) solved(out);
+  SceneOptions options = request.options;
+  options.views = placed_views(names, out.poses->model);
+  out.scene = scene_of_photographs(request.path, out.poses->model, options);
+  if (request.old_photographs) expect_old_photographs(out.scene);
+  auto& warnings = out.scene.warnings;
+  warnings.insert(warnings.end(), out.poses->warnings.begin(), out.poses->warnings.end());
+  auto& notes = out.scene.notes;
+  notes.insert(notes.end(), out.poses->notes.begin(), out.poses->notes.end());
+}
+
+// A scene with cameras.
+void read_stated(const SceneRequest& request, OpenedScene& out) {
+  out.scene = read_scene(request.path, request.options);
+  if (request.focal > 0) {
+    throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
+                       " states them (" + scene_kind_name(out.scene.kind) + ")");
+  }
+  if (request.each_lens) {
+    throw InvalidInput("--lenses each is for photographs without cameras; " +
+                       printable(request.path) + " states them (" +
+                       scene_kind_name(out.scene.kind) + ")");
+  }
+  check_known_distances(request.known_distances, out.scene);
+  if (request.old_photographs) expect_old_photographs(out.scene);
+  warn_of_turned(out.scene);
 }
 
 }  // namespace
@@ -99,53 +172,23 @@ bool SceneRequest::states_lengths() const {
   return !known_distances.empty() || !marker_size.empty();
 }
 
+bool needs_cameras(const SceneRequest& request) {
+  return request.refine_poses || is_photographs(request.path);
+}
+
 OpenedScene open_scene(const SceneRequest& request,
                        const std::filesystem::path& model,
-                       Terminal& terminal) {
+                       Terminal& terminal,
+                       const Solved& solved) {
   refuse_two_scales(request);
-  require(request.focal >= 0 && std::isfinite(request.focal),
-          "--focal must be a number of pixels above 0",
-          request.focal);
+  check_words(request);
   OpenedScene out;
   if (is_photographs(request.path)) {
-    if (request.refine_poses) {
-      throw InvalidInput("--refine-poses is for cameras that a scene states; " +
-                         printable(request.path) +
-                         " holds photographs alone, which are solved for as well as they can be");
-    }
-    if (!request.options.chunk.empty()) {
-      throw InvalidInput("--chunk is for cameras of Metashape; " + printable(request.path) +
-                         " holds photographs alone");
-    }
-    request.options.validate();
-    const SceneRoot root{request.path, request.options.allow_external};
-    const std::vector<std::string> names = names_of(root, request.options.views);
-    const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
-    const PhotoPoseOptions how{
-        request.focal, request.each_lens, request.old_photographs, request.options.all_views};
-    out.poses = photo_poses(root, names, how, stored, terminal);
-    SceneOptions options = request.options;
-    options.views = placed_views(names, out.poses->model);
-    out.scene = scene_of_photographs(request.path, out.poses->model, options);
-    if (request.old_photographs) expect_old_photographs(out.scene);
-    auto& warnings = out.scene.warnings;
-    warnings.insert(warnings.end(), out.poses->warnings.begin(), out.poses->warnings.end());
-    auto& notes = out.scene.notes;
-    notes.insert(notes.end(), out.poses->notes.begin(), out.poses->notes.end());
+    solve(request, model, terminal, solved, out);
   } else {
-    out.scene = read_scene(request.path, request.options);
-    if (request.focal > 0) {
-      throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
-                         " states them (" + scene_kind_name(out.scene.kind) + ")");
-    }
-    if (request.each_lens) {
-      throw InvalidInput("--lenses each is for photographs without cameras; " +
-                         printable(request.path) + " states them (" +
-                         scene_kind_name(out.scene.kind) + ")");
-    }
-    if (request.old_photographs) expect_old_photographs(out.scene);
-    warn_of_turned(out.scene);
+    read_stated(request, out);
     if (request.refine_poses) refine(model, terminal, out);
+    if (request.refine_poses && solved && !out.refined->is_stored) solved(out);
   }
   for (std::string& warning : baseline_warnings(out.scene)) {
     out.scene.warnings.push_back(std::move(warning));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -56,18 +57,27 @@ struct OpenedScene {
   void keep(const std::filesystem::path& model) const;
 };
 
+/// What to do with cameras that took minutes, before anything that may be refused.
+using Solved = std::function<void(const OpenedScene&)>;
+
 /// Reads a scene, solving for the cameras of a folder that holds nothing but photographs or
 /// refining those it states as asked, and gives it the unit the user assumes, or moves it into the
 /// frame of control points, if any.
 ///
 /// \param model  folder of the model the scene is for; cameras stored there by OpenedScene::keep()
 ///               are taken where they were solved from the same. Empty = none.
+/// \param solved called once cameras were solved for or refined, and not read; the scene may not be
+///               there yet, but OpenedScene::keep() works. May be empty.
 /// \throws InvalidInput where a focal length is given for a scene with cameras, refinement is asked
 ///         for where there are none, or two options state the scale; as read_scene(),
 ///         photo_poses(), refined_poses() and move_to_control_frame()
 OpenedScene open_scene(const SceneRequest& request,
                        const std::filesystem::path& model,
-                       Terminal& terminal);
+                       Terminal& terminal,
+                       const Solved& solved = {});
+
+/// Whether open_scene() may take minutes, to solve for cameras or to refine them.
+bool needs_cameras(const SceneRequest& request);
 
 /// How well cameras that were taken as the scene states them fit the photographs, as camera_fit();
 /// empty for others. What is wrong with them is added to the warnings of the scene.

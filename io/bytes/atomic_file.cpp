@@ -180,14 +180,21 @@ void make_output_folder(const std::filesystem::path& folder) {
   const AtomicFile probe(folder / ".probe");  // removed again, as it is never committed
 }
 
-NewFolder::NewFolder(std::filesystem::path folder)
-    : folder_(std::move(folder)), is_new_(!std::filesystem::exists(folder_)) {
-  make_output_folder(folder_);
+NewFolder::NewFolder(const std::filesystem::path& folder) {
+  std::error_code ignored;  // told by make_output_folder()
+  for (std::filesystem::path at = folder;
+       !at.empty() && !std::filesystem::exists(at, ignored) && !ignored;
+       at = at.parent_path()) {
+    made_.push_back(at);
+  }
+  make_output_folder(folder);
 }
 
 NewFolder::~NewFolder() {
   std::error_code is_not_empty;
-  if (is_new_) std::filesystem::remove(folder_, is_not_empty);
+  for (const std::filesystem::path& folder : made_) {
+    std::filesystem::remove(folder, is_not_empty);
+  }
 }
 
 }  // namespace cgs

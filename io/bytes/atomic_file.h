@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace cgs {
 
@@ -73,18 +74,17 @@ void write_file(const std::filesystem::path& path, std::string_view bytes);
 /// \throws IoError
 void make_output_folder(const std::filesystem::path& folder);
 
-/// Makes a folder as make_output_folder() and, if there was none, takes it away again should
-/// nothing have come into it while this lives.
+/// Makes a folder as make_output_folder() and takes it and parents that it made away again should
+/// nothing have come into them while this lives.
 class NewFolder {
  public:
-  explicit NewFolder(std::filesystem::path folder);
+  explicit NewFolder(const std::filesystem::path& folder);
   ~NewFolder();
   NewFolder(const NewFolder&) = delete;
   NewFolder& operator=(const NewFolder&) = delete;
 
  private:
-  std::filesystem::path folder_;
-  bool is_new_;
+  std::vector<std::filesystem::path> made_;  // the innermost first
 };
 
 }  // namespace cgs

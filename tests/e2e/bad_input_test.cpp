@@ -253,6 +253,29 @@ TEST(Usage, WhatPhotographsCannotHaveIsRefusedBeforeTheirCamerasAreSolvedFor) {
   const ProgramResult length = run_cgs(run + " --voxel-size 5mm");
   EXPECT_EQ(length.exit_code, 2) << length.err;
   EXPECT_NE(length.err.find("the scale of this scene is unknown"), std::string::npos) << length.err;
+  for (const auto& [words, told] :
+       {std::pair(" --assume-unit banana", "banana"),
+        std::pair(" --marker-size banana", "banana"),
+        std::pair(" --up 0 0 0", "--up"),
+        std::pair(" --known-distance a:1,2 c:3,4 1m", "no view \"c\" among 2: a, b"),
+        std::pair(" --known-distance a:1,2 b:3 1m", "VIEW:X,Y"),
+        std::pair(" --known-distance a:1,2 b:3,4 1", "unit")}) {
+    const ProgramResult refused = run_cgs(run + words);
+    EXPECT_EQ(refused.exit_code, 2) << words << refused.err;
+    EXPECT_NE(refused.err.find(told), std::string::npos) << words << refused.err;
+  }
+  EXPECT_EQ(run_cgs(run + " --control-points " + (dir / "missing.csv").string()).exit_code, 3);
+  const std::string photos = (dir / "photos").string();
+  for (const std::string command : {"run ", "train ", "split "}) {
+    const ProgramResult refused = run_cgs(command + photos + " -o " + (dir / "file/out").string());
+    EXPECT_EQ(refused.exit_code, 6) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(dir / "file")) << "nothing came into it";
+  }
+  test::write_bytes(dir / "file", "");
+  for (const std::string command : {"run ", "train ", "split "}) {
+    const ProgramResult refused = run_cgs(command + photos + " -o " + (dir / "file/out").string());
+    EXPECT_EQ(refused.exit_code, 5) << refused.err;
+  }
   write_png(dir / "photos/b.png", ColorImage(32, 24, Eigen::Vector3f::Constant(0.5f)));
   const ProgramResult focal = run_cgs(run + " --focal 50");
   EXPECT_EQ(focal.exit_code, 2) << focal.err;

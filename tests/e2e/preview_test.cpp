@@ -99,6 +99,30 @@ TEST(DryRun, ForetellsWhatARunTakesAndMakesNothing) {
   EXPECT_FALSE(fs::exists(dir / "out"));
 }
 
+// Which take minutes.
+TEST(SolvedCameras, StayWhateverIsRefusedLater) {
+  const TempDir dir;
+  fs::create_directories(dir / "photos");
+  for (const char* name : {"view_01.png", "view_02.png", "view_03.png", "view_05.png"}) {
+    fs::copy(test::portal_capture(1) / "images" / name, dir / "photos" / name);
+  }
+  const std::string photos = (dir / "photos").string();
+  const auto refused = [&](const std::string& command, const std::string& output) {
+    const test::ProgramResult run =
+        test::run_cgs(command + photos + " --marker-size 80mm -q -o " + (dir / output).string());
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    EXPECT_NE(run.err.find("no square marker is shown"), std::string::npos) << run.err;
+  };
+  refused("run ", "run");
+  const fs::path stored = dir / "run/model/colmap/poses.json";
+  ASSERT_TRUE(fs::exists(stored));
+  const auto before = fs::last_write_time(stored);
+  refused("run ", "run");
+  EXPECT_EQ(fs::last_write_time(stored), before) << "taken, not solved for again";
+  refused("train ", "model");
+  EXPECT_TRUE(fs::exists(dir / "model/colmap/poses.json"));
+}
+
 TEST(Preview, ExcludesWhatItChooses) {
   const TempDir dir;
   const test::ProgramResult run = preview(dir / "out", " --downscale 2");

@@ -204,6 +204,9 @@ TEST_F(KnownDistances, RefusesWhatCannotBeMeasured) {
   EXPECT_NE(refusal("left:1,2", "1").find("unit"), std::string::npos);
   EXPECT_NE(refusal("left:1,2", "1m+-2").find("unit"), std::string::npos);
   EXPECT_NE(refusal("left:1,2", "-1m").find("length"), std::string::npos);
+  EXPECT_THROW(check_known_distances({{"nowhere:1,2", good, "1m"}}, model_.scene), InvalidInput);
+  EXPECT_THROW(check_known_distances({{"left:1,2", good, "1"}}, model_.scene), InvalidInput);
+  EXPECT_NO_THROW(check_known_distances({{"left:240,2", good, "1m"}}, model_.scene));
   EXPECT_NE(refusal(good, "1m").find("one point"), std::string::npos);
   model_.priors[0].origin = Raster<DepthOrigin>(60, 40, DepthOrigin::Completed);
   EXPECT_NE(refusal("left:1,2", "1m").find("no depth was measured at left:1,2"), std::string::npos);

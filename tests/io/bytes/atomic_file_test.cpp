@@ -103,6 +103,21 @@ TEST(AtomicFile, RefusesAMissingFolder) {
   EXPECT_THROW(AtomicFile(dir / "no/such/file"), IoError);
 }
 
+TEST(NewFolder, GoesWithItsParentsUnlessSomethingCameIntoIt) {
+  const test::TempDir dir;
+  { const NewFolder folder(dir / "a/b/c"); }
+  EXPECT_FALSE(std::filesystem::exists(dir / "a"));
+  std::filesystem::create_directories(dir / "kept");
+  {
+    const NewFolder old(dir / "kept");
+    const NewFolder folder(dir / "a/b/c");
+    test::write_bytes(dir / "a/file", "");
+  }
+  EXPECT_TRUE(std::filesystem::exists(dir / "kept"));
+  EXPECT_TRUE(std::filesystem::exists(dir / "a/file"));
+  EXPECT_FALSE(std::filesystem::exists(dir / "a/b"));
+}
+
 TEST(MakeOutputFolder, RefusesAFileInItsPlace) {
   const test::TempDir dir;
   write_file(dir / "out", "a file");
