@@ -134,6 +134,11 @@ VolumeObject joined(const std::vector<const ModelObject*>& models,
                     const std::string& estimated,
                     const py::object& progress) {
   require(!models.empty(), "number of models must be > 0", 0);
+  for (size_t i = 0; i < models.size(); ++i) {
+    require(models[i] != nullptr,
+            "each of models must be a Model, number " + std::to_string(i),
+            "None");
+  }
   const ModelFusion request =
       model_fusion(voxel_size, estimated, models.front()->model.scene.frame);
   // Python holds them.

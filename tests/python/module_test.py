@@ -112,6 +112,8 @@ class Reconstruction(unittest.TestCase):
         np.testing.assert_array_equal(mesh.faces, told.faces)
         with self.assertRaises(cgs.InvalidInput):
             cgs.fuse_models([])
+        with self.assertRaisesRegex(cgs.InvalidInput, "number 1, but is None"):
+            cgs.fuse_models([self.model, None])
 
     def test_takes_photographs_as_the_program(self):
         scene = cgs.read_scene(CAPTURE, views=VIEWS, old_photographs=True, refine_poses=True)
