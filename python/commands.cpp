@@ -33,6 +33,13 @@ std::string typed(const py::handle& value) {
   return out;
 }
 
+// As `if value:` has it: 0 and numpy.False_ are not the object False.
+bool is_true(const py::handle& value) {
+  const int answer = PyObject_IsTrue(value.ptr());
+  if (answer < 0) throw py::error_already_set();
+  return answer == 1;
+}
+
 // voxel_size=0.5 as --voxel-size 0.5; a list for an option that takes one word as 1,10,19, for one
 // that takes several as so many words, and else as an option for each.
 void add_option(const CLI::App& command,
@@ -47,7 +54,9 @@ void add_option(const CLI::App& command,
                        command.get_name() + ") lists what it takes");
   }
   if (value.is_none() || value.ptr() == Py_False) return;
-  if (option->get_expected_max() == 0 || value.ptr() == Py_True) {
+  const bool is_flag = option->get_expected_max() == 0;
+  if (is_flag && !is_true(value)) return;
+  if (is_flag || value.ptr() == Py_True) {
     out.push_back(flag);
     return;
   }
@@ -124,8 +133,8 @@ void add_program(py::module_& module) {
       "program",
       R"(The commands of the program, on files: cgs.program.run("photos/portal", output="out").
 
-Options are those of the command line with _ for -, a flag is True, a list stands for several values.
-Each returns what the command prints with --json, as dict or list, and raises cgs.Error where the
+Options are those of the command line with _ for -, a flag is True or False, a list stands for
+several values. Each returns what the command prints with --json, as dict or list, and raises cgs.Error where the
 program would end with an error.)");
   CLI::App app("", "cgs");
   add_commands(app);

@@ -426,6 +426,8 @@ class Program(unittest.TestCase):
         cgs.Mesh([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]).save(mesh)
         told = cgs.program.measure(mesh, area=True, distance=[(0, 0, 0), (2, 0, 0)])
         self.assertEqual(told, program("measure", mesh, "--area", "--distance", "0,0,0", "2,0,0"))
+        for no in (False, 0, np.False_, None):
+            self.assertEqual(list(cgs.program.measure(mesh, area=True, volume=no)["figures"]), ["area"])
         out = Path(WORK) / "moved.ply"
         cgs.program.filter(mesh, out, op=["translate=1,0,0", "scale=2"])
         self.assertEqual(cgs.read_mesh(out).vertices.min(0).tolist(), [2, 0, 0])
