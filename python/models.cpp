@@ -152,15 +152,19 @@ VolumeObject joined(const std::vector<const ModelObject*>& models,
   });
 }
 
-py::object evaluated(ModelObject& m, const std::string& views, const py::object& progress) {
+py::object evaluated(const ModelObject& m, const std::string& views, const py::object& progress) {
   const std::vector<int> wanted =
       views.empty() ? m.model.scene.held_out : select_views(m.model.scene, views);
   const size_t known = m.model.scene.warnings.size();
+  std::vector<std::string> warnings;
   py::object out = python_of(result_of(progress, [&](Terminal& terminal) {
-    return evaluation_to_json(evaluate_views(m.model, wanted, terminal.begin("evaluate")));
+    Model own =
+        m.model;  // takes photographs and warnings; other threads may look at the shared one
+    auto found = evaluation_to_json(evaluate_views(own, wanted, terminal.begin("evaluate")));
+    warnings = std::move(own.scene.warnings);
+    return found;
   }));
-  warn(m.model.scene.warnings, known);
-  m.model.scene.warnings.resize(known);
+  warn(warnings, known);
   return out;
 }
 

@@ -178,6 +178,21 @@ class Reconstruction(unittest.TestCase):
         told = program("evaluate", self.folder)
         self.assertEqual(cgs.read_model(self.folder).evaluate()["mean"], told["mean"])
 
+    def test_is_evaluated_by_several_threads_at_once(self):
+        model = cgs.read_model(self.folder)
+        alone = model.evaluate()
+        told = [None] * 4
+
+        def evaluate(i):
+            told[i] = model.evaluate()
+
+        threads = [threading.Thread(target=evaluate, args=(i,)) for i in range(len(told))]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(told, [alone] * len(told))
+
     def test_takes_pictures_from_arrays(self):
         scene = cgs.read_scene(CAPTURE, views=VIEWS)
         scene.load()
