@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <sstream>
 #include <string>
@@ -94,6 +95,23 @@ std::vector<T> rows_of(const ArrayIn<Scalar>& array, const char* name) {
   if (!out.empty())
     std::memcpy(static_cast<void*>(out.data()), array.data(), out.size() * sizeof(T));
   return out;
+}
+
+/// A copy of an array of integers as rows of what they hold, to be checked before they are made
+/// smaller: ArrayIn would cut 2.9 and 2**32 + 2 down to 2.
+/// \tparam T  int64_t, or an array of them
+/// \throws InvalidInput if it holds other than integers, and as rows_of()
+template <typename T>
+std::vector<T> integers_of(const pybind11::object& object, const char* name) {
+  const auto array = pybind11::array::ensure(object);
+  require(bool(array),
+          std::string(name) + " must be an array",
+          std::string(pybind11::str(pybind11::type::of(object))));
+  const char kind = array.dtype().kind();
+  require(array.size() == 0 || kind == 'i' || kind == 'u',
+          std::string(name) + " must be integers",
+          std::string(pybind11::str(array.dtype())));
+  return rows_of<T, int64_t>(ArrayIn<int64_t>::ensure(array), name);
 }
 
 /// A copy of an array as a raster.

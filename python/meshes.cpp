@@ -56,12 +56,19 @@ void place_points(MeshObject& mesh, const std::vector<Eigen::Vector3d>& world) {
   }
 }
 
-void check_faces(const Faces& faces, size_t vertices) {
-  for (const auto& face : faces) {
-    for (const uint32_t v : face) {
-      require(v < vertices, "faces must name vertices below " + std::to_string(vertices), v);
+Faces faces_of(const py::object& array, size_t vertices) {
+  Faces out;
+  for (const auto& face : integers_of<std::array<int64_t, 3>>(array, "faces")) {
+    for (const int64_t v : face) {
+      require(v >= 0 && static_cast<uint64_t>(v) < vertices,
+              "faces must name vertices below " + std::to_string(vertices),
+              v);
     }
+    out.push_back({static_cast<uint32_t>(face[0]),
+                   static_cast<uint32_t>(face[1]),
+                   static_cast<uint32_t>(face[2])});
   }
+  return out;
 }
 
 // An array per vertex or per face, which must be as long as these.
@@ -74,10 +81,16 @@ std::vector<T> as_many(const ArrayIn<Scalar>& array, const char* name, size_t co
   return out;
 }
 
-std::vector<Provenance> labels_of(const ArrayIn<uint8_t>& array, size_t faces) {
+std::vector<Provenance> labels_of(const py::object& array, size_t faces) {
+  const auto labels = integers_of<int64_t>(array, "provenance");
+  require(labels.size() == faces,
+          "provenance must have " + std::to_string(faces) + " rows",
+          labels.size());
   std::vector<Provenance> out;
-  for (const uint8_t label : as_many<uint8_t>(array, "provenance", faces)) {
-    require(label < kProvenanceCount, "labels of provenance must be below 6", int(label));
+  for (const int64_t label : labels) {
+    require(label >= 0 && static_cast<uint64_t>(label) < kProvenanceCount,
+            "labels of provenance must be below 6",
+            label);
     out.push_back(static_cast<Provenance>(label));
   }
   return out;
@@ -94,10 +107,10 @@ void set_sigma(MeshObject& m, const ArrayIn<float>& sigma) {
 }
 
 MeshObject made(const ArrayIn<double>& vertices,
-                const std::optional<ArrayIn<uint32_t>>& faces,
+                const std::optional<py::object>& faces,
                 const std::optional<ArrayIn<float>>& colors,
                 const std::optional<ArrayIn<float>>& sigma,
-                const std::optional<ArrayIn<uint8_t>>& provenance,
+                const std::optional<py::object>& provenance,
                 double metres_per_unit) {
   MeshObject out;
   const std::vector<Eigen::Vector3d> points = rows(vertices);
@@ -105,8 +118,7 @@ MeshObject made(const ArrayIn<double>& vertices,
   state_unit(out.content.frame, metres_per_unit);
   place_points(out, points);
   TriangleMesh& mesh = out.content.mesh;
-  if (faces) mesh.faces = rows_of<std::array<uint32_t, 3>>(*faces, "faces");
-  check_faces(mesh.faces, points.size());
+  if (faces) mesh.faces = faces_of(*faces, points.size());
   if (colors) set_colors(out, *colors);
   if (sigma) set_sigma(out, *sigma);
   if (provenance) mesh.provenance = labels_of(*provenance, mesh.faces.size());

@@ -303,6 +303,21 @@ class Arrays(unittest.TestCase):
             cgs.Mesh(np.zeros((3, 2)))
         with self.assertRaisesRegex(cgs.InvalidInput, "below 3, but is 3"):
             cgs.Mesh(np.eye(3), [[0, 1, 3]])
+        for wrong, why in (
+            ([[0, 1, 2**32 + 2]], "below 3, but is 4294967298"),
+            ([[0, 1, -1]], "below 3, but is -1"),
+            ([[0, 1, 2.9]], "must be integers, but is float64"),
+            ("faces", "must be integers"),
+        ):
+            with self.assertRaisesRegex(cgs.InvalidInput, why):
+                cgs.Mesh(np.eye(3), wrong)
+        for wrong, why in (([258], "below 6, but is 258"), ([2.9], "integers"), ([1, 1], "1 rows")):
+            with self.assertRaisesRegex(cgs.InvalidInput, why):
+                cgs.Mesh(np.eye(3), [[0, 1, 2]], provenance=wrong)
+        for faces in ([[0, 1, 2]], np.array([[0, 1, 2]], np.uint8), np.array([[0, 1, 2]], np.uint64)):
+            mesh = cgs.Mesh(np.eye(3), faces, provenance=[2])
+            self.assertEqual((mesh.faces.tolist(), mesh.provenance.tolist()), ([[0, 1, 2]], [2]))
+        self.assertEqual(len(cgs.Mesh(np.eye(3), np.empty((0, 3))).faces), 0)
         with self.assertRaisesRegex(cgs.InvalidInput, "finite"):
             cgs.Mesh([[0, 0, np.nan]])
         scene = cgs.read_scene(CAPTURE, views=VIEWS)
