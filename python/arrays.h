@@ -48,6 +48,16 @@ pybind11::object rows_view(std::vector<T>& rows,
   return view_of<Scalar>(rows.data(), std::move(shape), holder);
 }
 
+/// The same, not to be changed in place: it was checked.
+template <typename Scalar, typename T>
+pybind11::object checked_rows_view(std::vector<T>& rows,
+                                   const pybind11::object& holder,
+                                   bool needed = false) {
+  pybind11::object out = rows_view<Scalar>(rows, holder, needed);
+  if (!out.is_none()) out.attr("flags").attr("writeable") = false;
+  return out;
+}
+
 /// Makes an array that Python may see another one of the same size, in its place: NumPy arrays of
 /// the old one would else show memory that is gone. Of another size the old one is kept for as long
 /// as the module is, as nobody knows who still looks at it.

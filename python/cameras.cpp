@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/cameras.h"
 
+#include <cmath>
 #include <optional>
 
 #include "python/arrays.h"
@@ -34,16 +35,25 @@ void place(Camera& camera, const ArrayIn<double>& pose) {
   camera.world_from_cam.matrix() = world_from_cam;
 }
 
+void check_camera(const Camera& c) {
+  require(c.width > 0 && c.height > 0, "a camera must have pixels, its width", c.width);
+  for (const double f : {c.fx, c.fy}) {
+    require(f > 0 && std::isfinite(f), "focal lengths must be positive and finite", f);
+  }
+  for (const double at : {c.cx, c.cy}) {
+    require(std::isfinite(at), "the principal point must be finite", at);
+  }
+}
+
 Camera made(int width, int height, double fx, double fy, double cx, double cy) {
   Camera out;
-  require(width > 0 && height > 0, "a camera must have pixels, its width", width);
-  require(fx > 0 && fy > 0, "focal lengths must be positive, fx", fx);
   out.width = width;
   out.height = height;
   out.fx = fx;
   out.fy = fy;
   out.cx = cx;
   out.cy = cy;
+  check_camera(out);
   return out;
 }
 
@@ -60,13 +70,16 @@ Camera in_world(Camera camera, const Frame& frame) {
 }
 
 Camera in_frame(Camera camera, const Frame& frame) {
+  check_camera(camera);  // its fields may have been changed since it was made
   camera.world_from_cam = internal_from_world(frame, camera.world_from_cam);
   return camera;
 }
 
 void state_unit(Frame& frame, double metres_per_unit) {
   if (metres_per_unit == 0) return;
-  require(metres_per_unit > 0, "metres_per_unit must be positive", metres_per_unit);
+  require(metres_per_unit > 0 && std::isfinite(metres_per_unit),
+          "metres_per_unit must be positive and finite",
+          metres_per_unit);
   frame.metres_per_unit = metres_per_unit;
   frame.scale_source = ScaleSource::Assumed;
 }

@@ -12,6 +12,7 @@
 namespace cgs {
 
 /// A camera in world coordinates, and one in those of a frame.
+/// \throws InvalidInput, the second, for numbers that are not finite or not positive
 Camera in_world(Camera camera, const Frame& frame);
 Camera in_frame(Camera camera, const Frame& frame);
 

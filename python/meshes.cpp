@@ -256,10 +256,8 @@ void add_arrays(Class& mesh) {
       .def_property_readonly(
           "faces",
           [](const py::object& self) {
-            py::object out =
-                rows_view<uint32_t>(self.cast<MeshObject&>().content.mesh.faces, self, true);
-            out.attr("flags").attr("writeable") = false;  // they were checked, and certified
-            return out;
+            return checked_rows_view<uint32_t>(
+                self.cast<MeshObject&>().content.mesh.faces, self, true);
           },
           "M x 3, uint32, counter-clockwise seen from outside; read only.")
       .def_property(
@@ -292,9 +290,11 @@ void add_arrays(Class& mesh) {
       .def_property_readonly(
           "provenance",
           [](const py::object& self) {
-            return rows_view<uint8_t>(self.cast<MeshObject&>().content.mesh.provenance, self);
+            return checked_rows_view<uint8_t>(self.cast<MeshObject&>().content.mesh.provenance,
+                                              self);
           },
-          "M, uint8: what vouches for each face, as PROVENANCE has it; None = nobody says.");
+          "M, uint8: what vouches for each face, as PROVENANCE has it; None = nobody says; read "
+          "only.");
 }
 
 template <typename Class>

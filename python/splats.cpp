@@ -60,6 +60,23 @@ int degree_of(py::ssize_t harmonics) {
                      std::to_string(harmonics));
 }
 
+// What could not be drawn. Rotations need not be of unit length: only their direction counts.
+void check_splats(const std::vector<Eigen::Vector3d>& world, const Gaussians& g) {
+  for (size_t i = 0; i < world.size(); ++i) {
+    require(world[i].allFinite(), "positions must be finite", world[i].transpose());
+    const Eigen::Vector3f& scale = g.scale[i];
+    require(scale.allFinite() && scale.minCoeff() >= 0 && scale.maxCoeff() > 0,
+            "scales must be finite, 0 or more, and not all 0",
+            scale.transpose());
+    const Eigen::Vector4f& rotation = g.rotation[i];
+    require(rotation.allFinite() && !rotation.isZero(0),
+            "rotations must be finite and not all 0",
+            rotation.transpose());
+    require(g.opacity[i] >= 0 && g.opacity[i] <= 1, "opacities must be in 0 ... 1", g.opacity[i]);
+  }
+  for (const Eigen::Vector3f& c : g.sh) require(c.allFinite(), "sh must be finite", c.transpose());
+}
+
 SplatsObject made(const ArrayIn<double>& positions,
                   const ArrayIn<float>& scales,
                   const ArrayIn<float>& rotations,
@@ -68,8 +85,6 @@ SplatsObject made(const ArrayIn<double>& positions,
                   double metres_per_unit) {
   SplatsObject out;
   const auto world = rows_of<Eigen::Vector3d>(positions, "positions");
-  out.frame = canonical_frame(world);
-  state_unit(out.frame, metres_per_unit);
   Gaussians& g = out.gaussians;
   g.scale = rows_of<Eigen::Vector3f>(scales, "scales");
   g.rotation = rows_of<Eigen::Vector4f>(rotations, "rotations");
@@ -84,6 +99,9 @@ SplatsObject made(const ArrayIn<double>& positions,
   }
   g.sh.resize(rows * static_cast<size_t>(sh.shape(1)));
   std::memcpy(static_cast<void*>(g.sh.data()), sh.data(), g.sh.size() * sizeof(Eigen::Vector3f));
+  check_splats(world, g);
+  out.frame = canonical_frame(world);
+  state_unit(out.frame, metres_per_unit);
   for (size_t i = 0; i < world.size(); ++i) {
     g.position.emplace_back(out.frame.internal_from_world(world[i]).cast<float>());
     g.scale[i] /= static_cast<float>(out.frame.scale);
@@ -244,9 +262,10 @@ void add_splats(py::module_& module) {
       .def_property_readonly(
           "provenance",
           [](const py::object& self) {
-            return rows_view<uint8_t>(self.cast<SplatsObject&>().gaussians.provenance, self);
+            return checked_rows_view<uint8_t>(self.cast<SplatsObject&>().gaussians.provenance,
+                                              self);
           },
-          "N, uint8: what vouches for each, as PROVENANCE has it; None = nobody says.")
+          "N, uint8: what vouches for each, as PROVENANCE has it; None = nobody says; read only.")
       .def_readonly("evidence", &SplatsObject::evidence, "What they rest on, in words.")
       .def_readonly("frame", &SplatsObject::frame)
       .def("__len__", [](const SplatsObject& s) { return s.gaussians.size(); })

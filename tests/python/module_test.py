@@ -333,6 +333,37 @@ class Arrays(unittest.TestCase):
         with self.assertRaisesRegex(cgs.InvalidInput, "a rotation"):
             camera.world_from_cam = 2 * np.eye(4)
 
+    def test_that_were_checked_cannot_be_changed(self):
+        mesh = cgs.Mesh(np.eye(3), [[0, 1, 2]], provenance=[2])
+        with self.assertRaisesRegex(ValueError, "read-only"):
+            mesh.provenance[0] = 200
+
+    def test_and_numbers_that_are_not_finite_are_refused(self):
+        for unit in (np.inf, np.nan, -1):
+            with self.assertRaisesRegex(cgs.InvalidInput, "metres_per_unit"):
+                cgs.Mesh(np.eye(3), [[0, 1, 2]], metres_per_unit=unit)
+        with self.assertRaisesRegex(cgs.InvalidInput, "principal point"):
+            cgs.Camera(4, 3, 2, 2, np.nan, 1.5)
+        with self.assertRaisesRegex(cgs.InvalidInput, "focal lengths"):
+            cgs.Camera(4, 3, 2, np.inf, 2, 1.5)
+        right = {"positions": [0, 0, 4], "scales": [1, 1, 1], "rotations": [1, 0, 0, 0],
+                 "opacities": 0.5, "sh": [[1, 0, -1]]}  # fmt: skip
+        for name, wrong in (
+            ("positions", [0, 0, np.inf]),
+            ("scales", [1, 1, -1]),
+            ("scales", [0, 0, 0]),
+            ("rotations", [0, 0, 0, 0]),
+            ("opacities", 2),
+            ("sh", [[np.nan, 0, 0]]),
+        ):
+            with self.assertRaisesRegex(cgs.InvalidInput, name):
+                cgs.Splats(**{key: [value] for key, value in (right | {name: wrong}).items()})
+        splats = cgs.Splats(**{key: [value] for key, value in right.items()})
+        camera = cgs.Camera(4, 3, 2, 2, 2, 1.5)
+        camera.cx = np.nan
+        with self.assertRaisesRegex(cgs.InvalidInput, "principal point"):
+            splats.render(camera)
+
 
 class Volumes(unittest.TestCase):
     def test_of_a_ball_have_its_size(self):
