@@ -74,9 +74,11 @@ ModelObject read(const std::filesystem::path& folder) {
   return out;
 }
 
-void save(const ModelObject& model, const std::filesystem::path& folder) {
+void save(const ModelObject& model, const std::filesystem::path& folder, bool overwrite) {
   work_beside(py::none(), [&] {
     const NewFolder made(folder);
+    const FolderLock lock(folder);
+    refuse_to_replace_model(folder, overwrite);
     write_model(folder, model.model);
   });
 }
@@ -222,7 +224,13 @@ void add_methods(Class& model) {
           py::arg("name"),
           "What an input view knows: a dict of new arrays, height x width: \"depth\" and \"sigma\" "
           "[world units] and \"origin\", as DEPTH_ORIGIN has it.")
-      .def("save", save, py::arg("folder"), "Writes a model folder, as the program does.");
+      .def(
+          "save",
+          save,
+          py::arg("folder"),
+          py::kw_only(),
+          py::arg("overwrite") = false,
+          "Writes a model folder, as the program does. overwrite: also where a finished model is.");
 }
 
 }  // namespace

@@ -82,6 +82,9 @@ class Reconstruction(unittest.TestCase):
         self.model.save(saved)
         splats = "gaussians.ply"
         self.assertEqual((saved / splats).read_bytes(), (self.folder / splats).read_bytes())
+        with self.assertRaisesRegex(cgs.InvalidInput, "holds a finished model"):
+            self.model.save(saved)
+        self.model.save(saved, overwrite=True)
         again = cgs.read_model(self.folder)
         self.assertEqual(again.input, ["view_01", "view_02", "view_03"])
         np.testing.assert_allclose(again.splats.positions, self.model.splats.positions, rtol=1e-6)
