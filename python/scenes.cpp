@@ -78,6 +78,7 @@ void set_input(Scene& scene, const std::vector<int>& views) {
   require(
       different.size() == views.size(), "input views must be different ones, number", views.size());
   scene.input = views;
+  std::erase_if(scene.held_out, [&](int view) { return different.contains(view); });
 }
 
 // All of another view, but with its arrays where Python may see those of this one.
@@ -185,7 +186,7 @@ void add_scene(py::module_& module) {
           "input",
           [](const Scene& s) { return s.input; },
           set_input,
-          "Indices of the views to reconstruct from; new.")
+          "Indices of the views to reconstruct from, which are then not held out; new.")
       .def_readonly("held_out", &Scene::held_out, "Indices of those kept to compare with; new.")
       .def_readonly("warnings", &Scene::warnings, "What is odd but usable, a line each; new.")
       .def_readonly("notes", &Scene::notes, "What was chosen, a line each; new.")

@@ -327,6 +327,9 @@ class Arrays(unittest.TestCase):
         for wrong in ([0, -1], [0, 10000], [1, 1]):
             with self.assertRaises(cgs.InvalidInput):
                 scene.input = wrong
+        held_out = scene.held_out
+        scene.input = [*scene.input, held_out[0]]
+        self.assertEqual(scene.held_out, held_out[1:])
         for kind in ("metric", "depth", "disparity", "auto"):
             scene.depth_kind = kind
             self.assertEqual(scene.depth_kind, kind)
