@@ -239,7 +239,9 @@ py::dict compared(const MeshObject& a, const MeshObject& b) {
 
 py::object certificate_of(MeshObject& mesh) {
   if (!mesh.certificate) {
-    mesh.certificate = result_of(py::none(), [&](Terminal&) { return certify(mesh.content.mesh); });
+    mesh.certificate = result_of(py::none(), [&](Terminal& terminal) {
+      return certify(mesh.content.mesh, terminal.begin("certificate"));
+    });
   }
   return python_of(certificate_to_json(*mesh.certificate, mesh.content.mesh, mesh.content.frame));
 }

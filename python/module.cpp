@@ -24,8 +24,9 @@ Cameras look along +z, with +x to the right and +y down; pixel (0, 0) is at the 
 centre at (0.5, 0.5); depth is along z, NaN where it is unknown. Colours are sRGB-coded, 0 to 1.
 Arrays are views of what an object holds, and may be changed in place, unless it says "new".
 
-Long work lets other Python threads run, stops within a moment at Ctrl-C, and calls `progress`,
-if given, with the name of the stage and the fraction done. What is odd but usable becomes a
+Long work lets other Python threads run. What takes `progress` calls it, if given, with the name
+of the stage and the fraction done, and stops within a moment at Ctrl-C, as does certificate();
+measuring, comparing, rendering, reading and saving come to their end first. What is odd but usable becomes a
 UserWarning, what cannot be used one of the exceptions below cgs.Error, with the words of the
 program. cgs.program has the commands of the program, on files.)";
 
