@@ -51,11 +51,15 @@ void keep_results_apart(const BatchArgs& args, const std::vector<std::string>& n
 // at the next start.
 constexpr const char* kFailure = "failure.txt";
 
-// "church" of photos/church and of photos/church/images.
+// "church" of photos/church, of photos/church/ and of photos/church/images. That of a link, as
+// samples/workflow has it, not of what it leads to.
 std::string name_of(const fs::path& scene) {
-  fs::path folder = fs::weakly_canonical(scene);
+  fs::path folder = fs::absolute(scene).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();
   if (folder.filename() == "images" && folder.has_parent_path()) folder = folder.parent_path();
-  return folder.filename().string();
+  if (folder.has_filename()) return folder.filename().string();
+  throw InvalidInput("the scene " + printable(scene) +
+                     " has no name that a folder of results could be called by");
 }
 
 std::vector<std::string> names_of(const std::vector<fs::path>& scenes) {

@@ -76,5 +76,17 @@ assert all(f.stat().st_mtime_ns != at for f, at in before.items())
 onto = subprocess.run([program, "batch", work / "first", "-o", work], capture_output=True, text=True)
 assert onto.returncode == 2 and "lies in the input" in onto.stderr, onto.stderr
 
+# Results are called as the scene was typed: by a link, also with a slash behind it and where nothing is.
+(work / "bad").mkdir()
+(work / "bad/transforms.json").write_text('{"frames": [')
+(work / "linked").symlink_to("bad")
+failing = [program, "batch", f"{work}/linked", f"{work}/bad/", f"{work}/missing/", "-o", work / "failed", "--json"]
+done = subprocess.run(failing, capture_output=True, text=True)
+assert done.returncode == 0, done.stderr
+assert [row["name"] for row in json.loads(done.stdout)] == ["linked", "bad", "missing"], done.stdout
+assert (work / "failed/missing/failure.txt").is_file() and not (work / "failed/failure.txt").exists()
+nameless = subprocess.run([program, "batch", "/", "-o", work / "no"], capture_output=True, text=True)
+assert nameless.returncode == 2 and "has no name" in nameless.stderr, nameless.stderr
+
 same = subprocess.run([program, "batch", work / "first", work / "out/../first", "-o", out], capture_output=True, text=True)
 assert same.returncode == 2 and "two scenes are called first" in same.stderr, same.stderr
