@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <exception>
@@ -155,6 +156,17 @@ void print_rows(const Json& rows) {
   }
 }
 
+// After all were tried, and told of.
+void refuse_failures(const std::vector<BatchResult>& results, const fs::path& output) {
+  const auto failed = std::count_if(
+      results.begin(), results.end(), [](const BatchResult& r) { return !r.failure.empty(); });
+  if (failed == 0) return;
+  constexpr int kBadInput = 3;
+  throw Error(kBadInput,
+              "--strict: " + std::to_string(failed) + " of " + std::to_string(results.size()) +
+                  " scenes failed; " + printable(output / "batch.json") + " says why");
+}
+
 void run_batch(const BatchArgs& args) {
   limit_threads(args.run.common.threads);
   const std::vector<std::string> names = names_of(args.scenes);
@@ -177,6 +189,7 @@ void run_batch(const BatchArgs& args) {
     print_rows(rows);
   }
   terminal.say("open " + (args.output / "index.html").string());
+  if (args.run.common.strict) refuse_failures(results, args.output);
 }
 
 }  // namespace
@@ -194,8 +207,8 @@ void add_batch(CLI::App& app) {
       "Example: cgs batch objects/*/ --preset draft -o out/objects\n"
       "         opens as out/objects/index.html\n"
       "Run again, it does what is not done yet. One that fails does not stop the others, and\n"
-      "the exit code is 0: OUT/batch.json says which, OUT/NAME/failure.txt why. Each run takes\n"
-      "all threads.");
+      "the exit code is 0, with --strict 3: OUT/batch.json says which, OUT/NAME/failure.txt why.\n"
+      "Each run takes all threads.");
   cmd->callback([args] { run_batch(*args); });
 }
 

@@ -85,6 +85,9 @@ done = subprocess.run(failing, capture_output=True, text=True)
 assert done.returncode == 0, done.stderr
 assert [row["name"] for row in json.loads(done.stdout)] == ["linked", "bad", "missing"], done.stdout
 assert (work / "failed/missing/failure.txt").is_file() and not (work / "failed/failure.txt").exists()
+strict = subprocess.run([*failing, "--strict"], capture_output=True, text=True)
+assert strict.returncode == 3 and "3 of 3 scenes failed" in strict.stderr, strict.stderr
+assert len(json.loads(strict.stdout)) == 3
 nameless = subprocess.run([program, "batch", "/", "-o", work / "no"], capture_output=True, text=True)
 assert nameless.returncode == 2 and "has no name" in nameless.stderr, nameless.stderr
 
