@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <string_view>
 
 #include <sys/resource.h>
 #include <unistd.h>
@@ -128,6 +131,13 @@ void let_interrupts_end() {
 int interrupt_exit_code() { return interrupt_signal == SIGTERM ? 143 : 130; }
 
 size_t peak_memory() {
+  // What getrusage() has is also of the program that this one was started by, up to exec().
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    constexpr std::string_view kPeak = "VmHWM:";
+    if (!line.starts_with(kPeak)) continue;
+    return std::strtoull(line.c_str() + kPeak.size(), nullptr, 10) * 1024;  // [kB]
+  }
   struct rusage usage = {};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<size_t>(usage.ru_maxrss) * 1024;

@@ -282,6 +282,22 @@ TEST(Usage, WhatPhotographsCannotHaveIsRefusedBeforeTheirCamerasAreSolvedFor) {
   EXPECT_NE(focal.err.find("a.png is 64 pixels long, b.png 32"), std::string::npos) << focal.err;
 }
 
+TEST(Output, StatesTheMemoryOfTheRunAndNotOfWhatStartedIt) {
+  constexpr size_t kLarge = size_t{700} << 20;
+  std::vector<char> large(kLarge, 1);
+  const TempDir dir;
+  write_scene(dir);
+  const std::string out = (dir / "out").string();
+  const ProgramResult run =
+      run_cgs("run " + (dir / "scene").string() + " -q --threads 1 --set steps=0 -o " + out);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto record = nlohmann::json::parse(test::read_bytes(dir / "out/run.json"));
+  for (const auto& [name, stage] : record["stages"].items()) {
+    EXPECT_LT(stage["peak_memory"], kLarge) << name;
+  }
+  EXPECT_EQ(large.back(), 1);  // is there to the end
+}
+
 // Under names that a run writes to, and beside them.
 TEST(Output, FilesOfOthersAreNotReplaced) {
   const TempDir dir;
