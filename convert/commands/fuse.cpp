@@ -14,6 +14,7 @@
 #include "convert/model/model.h"
 #include "convert/text/length.h"
 #include "convert/text/report_json.h"
+#include "io/bytes/atomic_file.h"
 #include "io/bytes/scene_path.h"
 #include "libcgs/core/error.h"
 
@@ -139,6 +140,7 @@ void run_fuse(const FuseArgs& args) {
   if (lower_extension(args.output) != ".vdb") {
     throw InvalidInput(printable(args.output) + " is no name of a volume: write NAME.vdb");
   }
+  { const AtomicFile can_be_written(args.output); }  // before all the work
   Terminal terminal(args.common.quiet, args.common.strict);
   if (args.inputs.size() > 1) {
     fuse_several_models(args, terminal);

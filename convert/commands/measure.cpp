@@ -10,6 +10,7 @@
 #include "convert/measure/measured_file.h"
 #include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
+#include "io/bytes/atomic_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -62,6 +63,9 @@ void check_outputs(const MeasureArgs& args) {
   require_ending(args.svg, ".svg", "--svg");
   require_ending(args.dxf, ".dxf", "--dxf");
   require_ending(args.thickness_ply, ".ply", "--thickness-ply");
+  for (const auto& output : {args.svg, args.dxf, args.thickness_ply}) {
+    if (!output.empty()) const AtomicFile can_be_written(output);  // before all the work
+  }
 }
 
 void run_measure(const MeasureArgs& args) {

@@ -12,6 +12,7 @@
 #include "convert/text/report_json.h"
 #include "convert/text/stated_frame.h"
 #include "convert/text/terminal.h"
+#include "io/bytes/atomic_file.h"
 #include "io/meshes/obj.h"
 #include "meshing/surface/isosurface.h"
 
@@ -31,6 +32,7 @@ struct MeshArgs {
 void run_mesh_command(const MeshArgs& args) {
   limit_threads(args.common.threads);
   Terminal terminal(args.common.quiet, args.common.strict);
+  const NewFolder folder(args.output);  // before all the work
   VolumeFile file = read_volume(args.volume);
   if (!args.assume_unit.empty()) {
     const std::string refused = assume_unit(file.frame, args.assume_unit);

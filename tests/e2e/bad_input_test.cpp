@@ -81,6 +81,9 @@ TEST(BadInput, FusionOfASceneWithoutDepthOrOfAModelWithOptionsOfDepth) {
     return run_cgs("fuse " + (dir / input).string() + more + " -q -o " +
                    (dir / "out.vdb").string());
   };
+  const ProgramResult nowhere =
+      run_cgs("fuse " + (dir / "scene").string() + " -q -o " + (dir / "no/out.vdb").string());
+  EXPECT_EQ(nowhere.exit_code, 5) << nowhere.err << "before the scene is read";
   const ProgramResult none = fuse("scene", "");
   EXPECT_EQ(none.exit_code, 3);
   EXPECT_EQ(std::count(none.err.begin(), none.err.end(), '\n'), 1) << none.err;

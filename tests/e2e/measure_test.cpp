@@ -296,6 +296,21 @@ TEST(Measure, WritesNothingOverItsInput) {
   EXPECT_EQ(test::entries(dir.path()), 3);
 }
 
+// Which may take minutes: nothing was printed before.
+TEST(Measure, RefusesWhatCannotBeWrittenBeforeItMeasures) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));
+  const std::string measure = "measure " + (dir / "a.obj").string() + " --area --section z=1 ";
+  for (const std::string output : {"--svg " + (dir / "no/a.svg").string(),
+                                   "--dxf " + (dir / "no/a.dxf").string(),
+                                   "--thickness-ply " + (dir / "no/a.ply").string()}) {
+    const test::ProgramResult run = run_cgs(measure + output);
+    EXPECT_EQ(run.exit_code, 5) << run.err;
+    EXPECT_EQ(run.out, "");
+  }
+  EXPECT_EQ(test::entries(dir.path()), 1);
+}
+
 TEST(Measure, TellsHowFarPointsWereOffAndWhatIsSeenOfAVolume) {
   const TempDir dir;
   test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));
