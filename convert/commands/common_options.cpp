@@ -48,7 +48,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
 }
 
 size_t stated_memory_limit(const CommonOptions& options) {
-  return options.memory_limit.empty() ? 0 : parse_bytes(options.memory_limit);
+  return options.memory_limit.empty() ? 0 : parse_bytes(options.memory_limit, "--memory-limit");
 }
 
 void add_output_options(CLI::App& command, CommonOptions& options) {

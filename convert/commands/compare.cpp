@@ -54,7 +54,7 @@ SurfaceAgreement agreement(const CompareArgs& args,
                            const MeasurableMesh& b,
                            const std::vector<Deviation>& a_to_b) {
   SurfaceAgreement out;
-  out.threshold = parse_length(args.threshold, a.frame);
+  out.threshold = parse_length(args.threshold, a.frame, "--threshold");
   out.accuracy = share_within(a_to_b, out.threshold);
   if (a.mesh.faces.empty()) {
     throw InvalidInput("--threshold needs a surface on both sides, but " + printable(args.a) +
@@ -221,7 +221,7 @@ void run_compare(const CompareArgs& args) {
   check_clouds(args, second.content);
   // With --scale it may be in a unit that is known afterwards alone.
   if (!args.threshold.empty() && !args.scale) {
-    (void)parse_length(args.threshold, first.content.frame);
+    (void)parse_length(args.threshold, first.content.frame, "--threshold");
   }
   check_units(args, first.content.frame, second.content.frame);
   const std::string turned = turned_text(first.content.frame, second.content.frame);

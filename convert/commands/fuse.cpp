@@ -75,7 +75,7 @@ void print_json(const FuseArgs& args,
 }
 
 ModelFusion model_fusion(const FuseArgs& args, const Frame& frame) {
-  return {length_or_zero(args.request.voxel_size, frame),
+  return {length_or_zero(args.request.voxel_size, frame, "--voxel-size"),
           args.estimated.value_or(EstimatedSurface::FillOnly),
           memory_budget(args.request.memory_limit)};
 }

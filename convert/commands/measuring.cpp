@@ -293,7 +293,8 @@ void Measuring::fit(const std::string& shape, const std::string& at, const std::
                        : shape == "sphere" ? Shape::Sphere
                                            : Shape::Cylinder;
   const SurfacePoint middle = pick(at);
-  const ShapeFit fit = fit_shape(mesh_, wanted, middle.position, parse_length(radius, mesh_.frame));
+  const ShapeFit fit =
+      fit_shape(mesh_, wanted, middle.position, parse_length(radius, mesh_.frame, "--radius"));
   const auto length = [&](double value) { return value * unit_.length; };
   const Json picked = picked_json(at, middle);
   Json out = {{"shape", shape},

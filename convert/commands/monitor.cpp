@@ -49,7 +49,7 @@ void run_monitor(const MonitorArgs& args) {
   Terminal terminal(args.common.quiet, args.common.strict);
   keep_apart(args.output, args.earlier);
   keep_apart(args.output, args.later);
-  if (!args.unit.empty()) (void)metres_in(args.unit);
+  if (!args.unit.empty()) (void)metres_in(args.unit, "--unit");
   const NewFolder folder(args.output);  // before minutes are spent
   TwoDates dates = read_two_dates(args.earlier, args.later, args.is_registered, terminal);
   if (!args.unit.empty() && !dates.earlier_surface.frame.has_metric_scale()) {

@@ -15,7 +15,7 @@ namespace {
 
 size_t asked_size(const std::string& text) {
   constexpr size_t kLeast = 1000;  // of a file with nothing in it
-  const size_t bytes = parse_file_size(text);
+  const size_t bytes = parse_file_size(text, "--max-size");
   if (bytes >= kLeast) return bytes;
   throw InvalidInput("--max-size " + text + " is " + std::to_string(bytes) +
                      " bytes, too few for any asset; write 800kB or 2MB");
@@ -103,12 +103,12 @@ RunRequest run_request(const RunArguments& arguments) {
   out.memory_limit = stated_memory_limit(arguments.common);
   out.estimated = arguments.estimated.value_or(out.estimated);
   if (!arguments.max_size.empty()) out.max_size = asked_size(arguments.max_size);
-  if (!out.scene.assume_unit.empty()) (void)metres_in(out.scene.assume_unit);
+  if (!out.scene.assume_unit.empty()) (void)metres_in(out.scene.assume_unit, "--assume-unit");
   return out;
 }
 
 double stated_budget(const RunArguments& arguments) {
-  const double budget = arguments.budget.empty() ? 0 : parse_seconds(arguments.budget);
+  const double budget = arguments.budget.empty() ? 0 : parse_seconds(arguments.budget, "--budget");
   const std::vector<std::string>& set = arguments.training.settings;
   const bool sets_steps = std::any_of(
       set.begin(), set.end(), [](const std::string& s) { return s.rfind("steps=", 0) == 0; });

@@ -32,7 +32,8 @@ void refuse_early(const TradeoffArgs& args) {
   require(request.minutes >= 0 && request.minutes <= 1e6,
           "--minutes must be in 0 ... 1000000",
           request.minutes);
-  if (!request.scene.assume_unit.empty()) (void)metres_in(request.scene.assume_unit);
+  if (!request.scene.assume_unit.empty())
+    (void)metres_in(request.scene.assume_unit, "--assume-unit");
   Frame of_known_scale;
   of_known_scale.metres_per_unit = 1;
   for (const std::string& want : args.wants) (void)parse_want(want, of_known_scale);

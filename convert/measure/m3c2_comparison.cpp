@@ -33,7 +33,7 @@ bool is_none(const std::string& length) {
   if (error != std::errc() || value != 0) return false;
   std::string unit(end, last);
   unit.erase(0, unit.find_first_not_of(' '));
-  if (!unit.empty()) (void)metres_in(unit);
+  if (!unit.empty()) (void)metres_in(unit, "--registration-error");
   return true;
 }
 
@@ -41,12 +41,14 @@ M3c2Options options_of(const M3c2Request& request,
                        const ComparedPoints& a,
                        const ComparedPoints& b,
                        const Frame& frame) {
-  M3c2Options out = m3c2_scales(request.cylinder.empty() ? spacing_cylinder(a, b)
-                                                         : parse_length(request.cylinder, frame));
-  if (!request.normal_scale.empty()) out.normal_scale = parse_length(request.normal_scale, frame);
-  if (!request.depth.empty()) out.depth = parse_length(request.depth, frame);
+  M3c2Options out =
+      m3c2_scales(request.cylinder.empty() ? spacing_cylinder(a, b)
+                                           : parse_length(request.cylinder, frame, "--cylinder"));
+  if (!request.normal_scale.empty())
+    out.normal_scale = parse_length(request.normal_scale, frame, "--normal-scale");
+  if (!request.depth.empty()) out.depth = parse_length(request.depth, frame, "--cylinder-depth");
   if (!request.registration.empty() && !is_none(request.registration)) {
-    out.registration = parse_length(request.registration, frame);
+    out.registration = parse_length(request.registration, frame, "--registration-error");
   }
   out.scale_sigma = request.scale_sigma;
   out.center = request.scale_center;

@@ -143,7 +143,7 @@ Placed place(const OrthophotoRequest& request,
   require(longest > 0, "an orthophoto needs a surface with extent, its size", longest);
   out.pixel_size = request.pixel_size.empty()
                        ? round_part(longest * unit.length)
-                       : parse_length(request.pixel_size, mesh.frame) * unit.length;
+                       : parse_length(request.pixel_size, mesh.frame, "--pixel-size") * unit.length;
   const double px = out.pixel_size;
   const double left = std::floor((axes.right.dot(origin) + across.low * unit.length) / px);
   const double right = std::ceil((axes.right.dot(origin) + across.high * unit.length) / px);

@@ -309,7 +309,7 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   }
   TsdfOptions fusing;
   if (!request.voxel_size.empty()) {
-    fusing.voxel_size = parse_length(request.voxel_size, scene.frame);
+    fusing.voxel_size = parse_length(request.voxel_size, scene.frame, "--voxel-size");
   }
   fusing.memory_limit = memory_budget(request.memory_limit);
   fusing.common_sigma = kCommonSensorSigma;

@@ -47,7 +47,8 @@ std::optional<SimplifyOptions> simplify_options(const std::string& length,
   constexpr double kPartOfVoxel = 0.25;
   constexpr double kLooserWhereInferred = 4;
   SimplifyOptions options;
-  options.max_error = length.empty() ? kPartOfVoxel * voxel : parse_length(length, frame);
+  options.max_error =
+      length.empty() ? kPartOfVoxel * voxel : parse_length(length, frame, "--simplify");
   options.max_error_inferred = kLooserWhereInferred * options.max_error;
   return options;
 }

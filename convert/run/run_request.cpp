@@ -68,10 +68,9 @@ OpenedScene open_scene_of(const RunRequest& request, Terminal& terminal) {
 
 void check_lengths(const RunRequest& request, Frame frame) {
   if (request.scene.states_lengths()) frame.metres_per_unit = 1;
-  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, frame);
-  for (const std::string& length : {request.max_error, request.compression_error}) {
-    if (!length.empty()) (void)parse_length(length, frame);
-  }
+  (void)length_or_zero(request.voxel_size, frame, "--voxel-size");
+  (void)length_or_zero(request.max_error, frame, "--max-error");
+  (void)length_or_zero(request.compression_error, frame, "--compression-error");
   (void)simplify_options(request.simplify, 1, frame);
   (void)atlas_texel(request, frame);
 }
@@ -93,7 +92,7 @@ std::optional<double> atlas_texel(const RunRequest& request, const Frame& frame)
     throw InvalidInput("--texture " + request.texture +
                        ": allowed are photographs, atlas, and atlas= with the size of a pixel");
   }
-  return parse_length(request.texture.substr(kSized.size()), frame);
+  return parse_length(request.texture.substr(kSized.size()), frame, "--texture");
 }
 
 void refuse_contradictions(const RunRequest& request) {

@@ -396,7 +396,7 @@ void warn_of_frame(const ControlFit& fit, Scene& scene) {
 
 ControlReport move_to_control_frame(const ControlRequest& request, Scene& scene) {
   const std::string unit = request.unit.empty() ? "m" : request.unit;
-  const double metres = metres_in(unit);
+  const double metres = metres_in(unit, "--control-unit");
   std::vector<Sighted> points;
   for (const ControlPoint& point : read_control_points(request.file)) {
     points.push_back(sighted(point, scene, request.file));

@@ -216,7 +216,8 @@ std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typ
     KnownDistance distance;
     distance.a = pick_of(words[0], scene);
     distance.b = pick_of(words[1], scene);
-    std::tie(distance.metres, distance.sigma) = parse_metres_with_sigma(words[2]);
+    std::tie(distance.metres, distance.sigma) =
+        parse_metres_with_sigma(words[2], "--known-distance");
     distance.text = words[0] + " " + words[1] + " " + words[2];
     out.push_back(std::move(distance));
   }
@@ -227,7 +228,7 @@ void check_known_distances(const std::vector<DistanceWords>& typed, const Scene&
   for (const DistanceWords& words : typed) {
     (void)typed_pick(words[0], named);
     (void)typed_pick(words[1], named);
-    (void)parse_metres_with_sigma(words[2]);
+    (void)parse_metres_with_sigma(words[2], "--known-distance");
   }
 }
 

@@ -132,7 +132,7 @@ double common_sigma(const Observations& seen) {
 
 std::vector<MarkerBar> marker_bars(const Scene& scene, const std::string& size) {
   if (size.empty()) return {};
-  const auto [known, known_sigma] = parse_metres_with_sigma(size);
+  const auto [known, known_sigma] = parse_metres_with_sigma(size, "--marker-size");
   const std::map<std::string, Observations> seen = observations(scene);
   std::vector<MarkerBar> out;
   for (const auto& [name, places] : seen) {

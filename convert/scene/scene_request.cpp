@@ -91,11 +91,12 @@ void check_words(const SceneRequest& request) {
   require(request.focal >= 0 && std::isfinite(request.focal),
           "--focal must be a number of pixels above 0",
           request.focal);
-  if (!request.assume_unit.empty()) (void)metres_in(request.assume_unit);
+  if (!request.assume_unit.empty()) (void)metres_in(request.assume_unit, "--assume-unit");
   if (!request.up.empty()) (void)up_direction(request.up);
-  if (!request.marker_size.empty()) (void)parse_metres_with_sigma(request.marker_size);
+  if (!request.marker_size.empty())
+    (void)parse_metres_with_sigma(request.marker_size, "--marker-size");
   if (request.control.file.empty()) return;
-  if (!request.control.unit.empty()) (void)metres_in(request.control.unit);
+  if (!request.control.unit.empty()) (void)metres_in(request.control.unit, "--control-unit");
   (void)read_control_points(request.control.file);
 }
 

@@ -159,7 +159,7 @@ Volume make_volume(const ConversionRequest& request,
   FusedVolume fused;
   if (source.model) {
     const ModelFusion fusion = {
-        .voxel_size = length_or_zero(wanted.voxel_size, source.model->scene.frame),
+        .voxel_size = length_or_zero(wanted.voxel_size, source.model->scene.frame, "--voxel-size"),
         .memory_limit = memory_budget(wanted.memory_limit)};
     fused = fuse_model(*source.model, fusion, progress);
     report["fusion"] = fusion_to_json(fused.report, source.frame);
@@ -216,7 +216,9 @@ std::string write_mesh(const ConversionRequest& request, const Source& source, c
   GlbOptions options;
   options.encoding = request.encoding;
   if (!request.compression_error.empty()) {
-    options.max_error = parse_length(request.compression_error, source.frame) * source.frame.scale;
+    options.max_error =
+        parse_length(request.compression_error, source.frame, "--compression-error") *
+        source.frame.scale;
   }
   options.summary_json = json_text(report, -1);
   options.local_origin = request.local_origin;
@@ -303,9 +305,9 @@ void check_before_work(const ConversionRequest& request, const Source& source, C
   refuse_without_effect(request, source, wanted);
   if (wanted == Content::Splats) return;
   if (!request.volume.voxel_size.empty())
-    (void)parse_length(request.volume.voxel_size, source.frame);
+    (void)parse_length(request.volume.voxel_size, source.frame, "--voxel-size");
   if (!request.compression_error.empty()) {
-    (void)parse_length(request.compression_error, source.frame);
+    (void)parse_length(request.compression_error, source.frame, "--compression-error");
   }
   (void)simplify_options(request.simplify, 1, source.frame);
 }

@@ -121,7 +121,8 @@ SplatVolume splat_volume(Gaussians gaussians,
   gaussians = {};  // their memory is the fusion's now
   TsdfOptions options;
   options.voxel_size = default_voxel(views, virtual_views.radius);
-  if (!request.voxel_size.empty()) options.voxel_size = parse_length(request.voxel_size, frame);
+  if (!request.voxel_size.empty())
+    options.voxel_size = parse_length(request.voxel_size, frame, "--voxel-size");
   options.memory_limit = memory_budget(request.memory_limit);
   out.two_sided = thicken(views, normals, kPlateVoxels * options.voxel_size);
   report(progress, 0.7);

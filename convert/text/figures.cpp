@@ -47,7 +47,7 @@ FigureUnit figure_unit(const Frame& frame, const std::string& wanted) {
   }
   const std::string name = wanted.empty() ? "m" : wanted;
   return {name,
-          frame.scale * frame.metres_per_unit / metres_in(name),
+          frame.scale * frame.metres_per_unit / metres_in(name, "--unit"),
           frame.metres_sigma / frame.metres_per_unit};
 }
 

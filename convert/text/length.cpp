@@ -22,12 +22,19 @@ constexpr std::array<std::pair<std::string_view, double>, 7> kUnits = {{{"m", 1.
                                                                         {"in", 0.0254},
                                                                         {"ft", 0.3048}}};
 
+// "--voxel-size: '5q'"
+std::string quoted(const std::string& text, const std::string& option) {
+  return (option.empty() ? "'" : option + ": '") + text + "'";
+}
+
 // Splits "0.5mm" into 0.5 and "mm".
-std::pair<double, std::string> number_and_suffix(const std::string& text, const char* what) {
+std::pair<double, std::string> number_and_suffix(const std::string& text,
+                                                 const char* what,
+                                                 const std::string& option) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || !(value > 0) || !std::isfinite(value)) {
-    throw InvalidInput("'" + text + "' is not a positive " + what);
+    throw InvalidInput(quoted(text, option) + " is not a positive " + what);
   }
   std::string suffix(end, text.data() + text.size());
   suffix.erase(0, suffix.find_first_not_of(' '));
@@ -42,29 +49,29 @@ std::string without_blanks(const std::string& text) {
 
 }  // namespace
 
-double metres_in(const std::string& unit) {
+double metres_in(const std::string& unit, const std::string& option) {
   std::string known;
   for (const auto& [name, metres] : kUnits) {
     if (unit == name) return metres;
     known += (known.empty() ? "" : ", ") + std::string(name);
   }
-  throw InvalidInput("'" + unit + "' is not a unit of length; known are " + known);
+  throw InvalidInput(quoted(unit, option) + " is not a unit of length; known are " + known);
 }
 
-double parse_length(const std::string& text, const Frame& frame) {
-  const auto [value, unit] = number_and_suffix(text, "length");
+double parse_length(const std::string& text, const Frame& frame, const std::string& option) {
+  const auto [value, unit] = number_and_suffix(text, "length", option);
   if (unit.empty()) return value / frame.scale;
-  const double metres = value * metres_in(unit);
+  const double metres = value * metres_in(unit, option);
   if (!frame.has_metric_scale()) {
-    throw InvalidInput("'" + text +
-                       "': the scale of this scene is unknown; give the length in scene "
+    throw InvalidInput(quoted(text, option) +
+                       ": the scale of this scene is unknown; give the length in scene "
                        "units, or say --assume-unit");
   }
   return metres / frame.metres_per_unit / frame.scale;
 }
 
-double length_or_zero(const std::string& text, const Frame& frame) {
-  return text.empty() ? 0 : parse_length(text, frame);
+double length_or_zero(const std::string& text, const Frame& frame, const std::string& option) {
+  return text.empty() ? 0 : parse_length(text, frame, option);
 }
 
 double parse_coordinate(const std::string& text, const Frame& frame) {
@@ -81,19 +88,19 @@ double parse_coordinate(const std::string& text, const Frame& frame) {
   return is_negative ? -length : length;
 }
 
-double parse_metres(const std::string& text) {
-  const auto [value, unit] = number_and_suffix(text, "length");
-  return value * metres_in(unit);
+double parse_metres(const std::string& text, const std::string& option) {
+  const auto [value, unit] = number_and_suffix(text, "length", option);
+  return value * metres_in(unit, option);
 }
 
-std::pair<double, double> parse_metres_with_sigma(std::string text) {
+std::pair<double, double> parse_metres_with_sigma(std::string text, const std::string& option) {
   const std::string plus_minus = "±";
   const size_t sign = text.find(plus_minus);
   if (sign != std::string::npos) text.replace(sign, plus_minus.size(), "+-");
   const size_t split = text.find("+-");
-  const double metres = parse_metres(without_blanks(text.substr(0, split)));
+  const double metres = parse_metres(without_blanks(text.substr(0, split)), option);
   if (split == std::string::npos) return {metres, 0};
-  return {metres, parse_metres(without_blanks(text.substr(split + 2)))};
+  return {metres, parse_metres(without_blanks(text.substr(split + 2)), option)};
 }
 
 std::string format_length(double internal_length, const Frame& frame) {
@@ -112,8 +119,8 @@ std::string format_length(double internal_length, const Frame& frame) {
   return text.data();
 }
 
-size_t parse_bytes(const std::string& text) {
-  const auto [value, suffix] = number_and_suffix(text, "amount of memory");
+size_t parse_bytes(const std::string& text, const std::string& option) {
+  const auto [value, suffix] = number_and_suffix(text, "amount of memory", option);
   static constexpr std::string_view kPrefixes = "KMGT";
   const size_t prefix = suffix.empty() ? 0 : kPrefixes.find(suffix[0]);
   const std::string rest = suffix.empty() ? "" : suffix.substr(1);
@@ -122,13 +129,13 @@ size_t parse_bytes(const std::string& text) {
       prefix != std::string_view::npos && (rest.empty() || rest == "B" || rest == "iB");
   const double bytes = is_unit ? std::ldexp(value, 10 * power) : 0;
   if (!(bytes >= 1 && bytes < 0x1p53)) {
-    throw InvalidInput("'" + text + "' is not an amount of memory; write 512M or 4G");
+    throw InvalidInput(quoted(text, option) + " is not an amount of memory; write 512M or 4G");
   }
   return static_cast<size_t>(bytes);
 }
 
-size_t parse_file_size(const std::string& text) {
-  const auto [value, suffix] = number_and_suffix(text, "size of a file");
+size_t parse_file_size(const std::string& text, const std::string& option) {
+  const auto [value, suffix] = number_and_suffix(text, "size of a file", option);
   static constexpr std::array<std::pair<std::string_view, double>, 9> kSizes = {{{"", 1},
                                                                                  {"B", 1},
                                                                                  {"kB", 1e3},
@@ -142,16 +149,17 @@ size_t parse_file_size(const std::string& text) {
     const double size = value * bytes;
     if (suffix == name && size >= 1 && size < 0x1p53) return static_cast<size_t>(size);
   }
-  throw InvalidInput("'" + text + "' is not the size of a file; write 800kB, 2MB or 1.5MiB");
+  throw InvalidInput(quoted(text, option) +
+                     " is not the size of a file; write 800kB, 2MB or 1.5MiB");
 }
 
-double parse_seconds(const std::string& text) {
-  const auto [value, unit] = number_and_suffix(text, "time");
+double parse_seconds(const std::string& text, const std::string& option) {
+  const auto [value, unit] = number_and_suffix(text, "time", option);
   for (const auto& [name, seconds] :
        {std::pair("", 1.0), std::pair("s", 1.0), std::pair("min", 60.0), std::pair("h", 3600.0)}) {
     if (unit == name) return value * seconds;
   }
-  throw InvalidInput("'" + text + "' is not a time; write 90s, 3min or 1.5h");
+  throw InvalidInput(quoted(text, option) + " is not a time; write 90s, 3min or 1.5h");
 }
 
 std::string format_seconds(double seconds) {

@@ -13,7 +13,7 @@
 namespace cgs {
 
 std::string assume_unit(Frame& frame, const std::string& unit) {
-  const double metres = metres_in(unit);
+  const double metres = metres_in(unit, "--assume-unit");
   if (!frame.has_metric_scale()) {
     frame.metres_per_unit = metres;
     frame.scale_source = ScaleSource::Assumed;

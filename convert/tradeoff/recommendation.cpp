@@ -44,13 +44,13 @@ double amount(const std::string& text,
 double limit_of(Quantity quantity, const std::string& text, const Frame& frame) {
   switch (quantity) {
     case Quantity::Error:
-      return parse_length(text, frame) * frame.scale;
+      return parse_length(text, frame, "--want") * frame.scale;
     case Quantity::Size:
-      return static_cast<double>(parse_file_size(text));
+      return static_cast<double>(parse_file_size(text, "--want"));
     case Quantity::Psnr:
       return amount(text, {{"dB", 1}}, "24dB");
     default:
-      return parse_seconds(text);
+      return parse_seconds(text, "--want");
   }
 }
 

@@ -301,9 +301,9 @@ TEST(Measure, RefusesWhatCannotBeWrittenBeforeItMeasures) {
   const TempDir dir;
   test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));
   const std::string measure = "measure " + (dir / "a.obj").string() + " --area --section z=1 ";
-  for (const std::string output : {"--svg " + (dir / "no/a.svg").string(),
-                                   "--dxf " + (dir / "no/a.dxf").string(),
-                                   "--thickness-ply " + (dir / "no/a.ply").string()}) {
+  for (const std::string& output : {"--svg " + (dir / "no/a.svg").string(),
+                                    "--dxf " + (dir / "no/a.dxf").string(),
+                                    "--thickness-ply " + (dir / "no/a.ply").string()}) {
     const test::ProgramResult run = run_cgs(measure + output);
     EXPECT_EQ(run.exit_code, 5) << run.err;
     EXPECT_EQ(run.out, "");

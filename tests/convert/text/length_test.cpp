@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/text/length.h"
 
+#include <functional>
+
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
+#include "tests/support/scene_files.h"
 
 namespace cgs::length_test {
 namespace {
@@ -71,6 +74,23 @@ TEST(ParseFileSize, KnowsBothKindsOfPrefixes) {
   EXPECT_EQ(format_file_size(81'200), "81.2 kB");
   EXPECT_EQ(format_file_size(999'990), "1000.0 kB");
   EXPECT_EQ(format_file_size(12'345'678'901), "12345.68 MB");
+}
+
+TEST(ParseLength, NamesTheOptionThatTheTextWasGivenTo) {
+  const auto message = [](const std::function<void()>& parse) { return test::message_of(parse); };
+  EXPECT_EQ(message([] { parse_length("5q", {}, "--voxel-size"); }),
+            "--voxel-size: 'q' is not a unit of length; known are m, cm, mm, um, km, in, ft");
+  EXPECT_EQ(message([] { parse_length("-5", {}, "--voxel-size"); }),
+            "--voxel-size: '-5' is not a positive length");
+  EXPECT_EQ(message([] {
+              parse_length("5mm", {}, "--voxel-size");
+            }).find("--voxel-size: '5mm': the scale of this scene is unknown"),
+            0u);
+  EXPECT_EQ(message([] { parse_metres_with_sigma("1m+-x", "--marker-size"); }),
+            "--marker-size: 'x' is not a positive length");
+  EXPECT_EQ(message([] { parse_seconds("soon", "--budget"); }),
+            "--budget: 'soon' is not a positive time");
+  EXPECT_EQ(message([] { parse_length("-5", {}); }), "'-5' is not a positive length");
 }
 
 TEST(ParseSeconds, KnowsSecondsMinutesAndHours) {
