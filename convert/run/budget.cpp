@@ -168,6 +168,7 @@ int first_trial(Search& search, int steps) {
 void run_trials(Search& search) {
   const int draft = training_preset("draft").steps;
   const int smallest = first_trial(search, draft / 4);
+  if (search.left() <= 0) return;  // no other setting takes less
   search.runs.insert(
       search.runs.begin(),
       {training_trial(search, smallest, draft / 4), training_trial(search, smallest, draft)});
@@ -253,7 +254,8 @@ Choice choose(Search& search, const std::string& asked, const fs::path& file) {
     throw LimitError("--budget " + format_seconds(search.deadline) +
                      " is too short; the quickest setting, " +
                      size_words(search.opened.scene, quickest.downscale) + ", needs about " +
-                     format_seconds((search.elapsed() + quickest.seconds) * kReserve));
+                     format_seconds((search.elapsed() + quickest.seconds) * kReserve) +
+                     (search.runs.size() == 1 ? " or more" : ""));
   }
   Json trials = Json::array();
   for (const TimedRun& run : search.runs) {

@@ -157,7 +157,8 @@ double parse_seconds(const std::string& text, const std::string& option) {
   const auto [value, unit] = number_and_suffix(text, "time", option);
   for (const auto& [name, seconds] :
        {std::pair("", 1.0), std::pair("s", 1.0), std::pair("min", 60.0), std::pair("h", 3600.0)}) {
-    if (unit == name) return value * seconds;
+    constexpr double kLongest = 1e9;  // thirty years, of any work
+    if (unit == name && value * seconds <= kLongest) return value * seconds;
   }
   throw InvalidInput(quoted(text, option) + " is not a time; write 90s, 3min or 1.5h");
 }
