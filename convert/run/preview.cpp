@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <exception>
+#include <new>
 
 #include <nlohmann/json.hpp>
 
@@ -116,10 +118,10 @@ bool is_worth_a_preview(const Scene& scene, const Scene& full) {
 }
 
 void look_first(const RunRequest& request, const OpenedScene& opened, Terminal& terminal) {
-  const Scene full = full_scene(request, request.output / "model");
-  if (!is_worth_a_preview(opened.scene, full)) return;
-  (void)terminal.begin("first look");
   try {
+    const Scene full = full_scene(request, request.output / "model");
+    if (!is_worth_a_preview(opened.scene, full)) return;
+    (void)terminal.begin("first look");
     Terminal silent = Terminal::silent();
     const Json report = run_pipeline(preview_request(request, opened, full), silent).report;
     (void)terminal.end("");
@@ -128,8 +130,10 @@ void look_first(const RunRequest& request, const OpenedScene& opened, Terminal& 
                  " while the rest is made");
   } catch (const Cancelled&) {
     throw;
-  } catch (const Error& error) {
-    (void)terminal.end("failed: " + std::string(error.what()));
+  } catch (const std::bad_alloc&) {
+    throw;  // ends the program
+  } catch (const std::exception& error) {
+    terminal.say("first look failed: " + std::string(error.what()));
   }
 }
 

@@ -74,6 +74,9 @@ TEST(Preview, OfARunShowsItsPhotographs) {
   const OpenedScene opened = open_scene(request.scene, {}, terminal);
   look_first(request, opened, terminal);
   EXPECT_FALSE(fs::exists(dir / "out")) << "not worth it";
+  RunRequest gone = request;
+  gone.scene.path = dir / "gone";
+  EXPECT_NO_THROW(look_first(gone, opened, terminal)) << "whatever is wrong, the run goes on";
   (void)write_preview(request, terminal);
   const auto report = nlohmann::json::parse(test::read_bytes(dir / "out/preview/report.json"));
   EXPECT_EQ(report["model"]["depth_of_views"].size(), 2U);
