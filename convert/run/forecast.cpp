@@ -20,6 +20,8 @@ using Json = nlohmann::ordered_json;
 Json forecast(const RunRequest& request, Terminal& terminal) {
   refuse_contradictions(request);
   const Scene scene = open_scene_of(request, terminal).scene;
+  (void)known_distances(request.scene.known_distances, scene);  // what the run would refuse at once
+  check_lengths(request, scene);
   terminal.note(scene.notes);
   terminal.warn(scene.warnings);
   Json memory = Json::object();

@@ -33,10 +33,8 @@
 #include "convert/text/stated_frame.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/json_file.h"
-#include "io/bytes/scene_path.h"
 #include "io/images/image.h"
 #include "io/scenes/depth_file.h"
-#include "io/scenes/photographs.h"
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/photograph_cache.h"
@@ -371,20 +369,6 @@ FinishedRun run_stages(Run& run, Terminal& terminal) {
   return out;
 }
 
-// Lengths that will be refused, before minutes are spent on cameras.
-void check_lengths_of_photographs(const RunRequest& request) {
-  if (!is_photographs(request.scene.path)) return;
-  Frame frame;
-  const DepthOptions& depth = request.scene.options.depth;
-  const bool has_depth = !depth.folder.empty() || is_folder(request.scene.path / "depth");
-  const bool may_be_metric = depth.kind == DepthKind::Unknown || depth.kind == DepthKind::Metric;
-  const bool may_tell_scale = has_depth && may_be_metric && depth.network.empty();
-  const bool states_unit =
-      !request.scene.assume_unit.empty() || !request.scene.control.file.empty();
-  if (states_unit || may_tell_scale) frame.metres_per_unit = 1;
-  check_lengths(request, frame);
-}
-
 void remove_all_abandoned_files(const std::filesystem::path& output) {
   for (const char* folder : {"",
                              "model",
@@ -404,7 +388,6 @@ FinishedRun run_pipeline(const RunRequest& request,
                          Terminal& terminal,
                          const FirstLook& first_look) {
   refuse_contradictions(request);
-  check_lengths_of_photographs(request);
   if (!request.overwrite) refuse_foreign_files(request.output, stage_files({}, request.lods));
   OpenedScene opened = open_scene_of(request, terminal);
   Scene& scene = opened.scene;

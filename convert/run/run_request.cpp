@@ -13,6 +13,7 @@
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/scene_path.h"
+#include "io/scenes/photographs.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -51,10 +52,25 @@ void refuse_paths_of_other_bytes(const SceneRequest& request) {
   }
 }
 
+// Lengths that will be refused, before minutes are spent on cameras.
+void check_lengths_of_photographs(const RunRequest& request) {
+  if (!is_photographs(request.scene.path)) return;
+  Frame frame;
+  const DepthOptions& depth = request.scene.options.depth;
+  const bool has_depth = !depth.folder.empty() || is_folder(request.scene.path / "depth");
+  const bool may_be_metric = depth.kind == DepthKind::Unknown || depth.kind == DepthKind::Metric;
+  const bool may_tell_scale = has_depth && may_be_metric && depth.network.empty();
+  const bool states_unit =
+      !request.scene.assume_unit.empty() || !request.scene.control.file.empty();
+  if (states_unit || may_tell_scale) frame.metres_per_unit = 1;
+  check_lengths(request, frame);
+}
+
 }  // namespace
 
 OpenedScene open_scene_of(const RunRequest& request, Terminal& terminal) {
   refuse_paths_of_other_bytes(request.scene);
+  check_lengths_of_photographs(request);
   const std::filesystem::path model = request.output / "model";
   std::optional<NewFolder> folder;
   if (needs_cameras(request.scene)) folder.emplace(request.output);

@@ -99,6 +99,13 @@ TEST(DryRun, ForetellsWhatARunTakesAndMakesNothing) {
   const nlohmann::json large = foretold(" --use-all");
   EXPECT_GT(large["most_memory"], small["most_memory"]);
   EXPECT_GT(large["disk"], small["disk"]);
+  for (const char* wrong : {" --voxel-size 5q",
+                            " --known-distance typo:1,2 view_01:3,4 1m",
+                            " --known-distance view_01:1,2 view_01:99999,4 1m"}) {
+    const test::ProgramResult run =
+        test::run_cgs("run " + scene + wrong + " --dry-run -o " + (dir / "out").string());
+    EXPECT_EQ(run.exit_code, 2) << wrong << run.err;
+  }
   EXPECT_FALSE(fs::exists(dir / "out"));
 }
 
