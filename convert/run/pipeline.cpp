@@ -21,6 +21,7 @@
 #include "convert/report/report.h"
 #include "convert/report/report_viewer.h"
 #include "convert/run/disk_plan.h"
+#include "convert/run/readable_inputs.h"
 #include "convert/run/request_fields.h"
 #include "convert/run/run_files.h"
 #include "convert/run/run_record.h"
@@ -33,9 +34,6 @@
 #include "convert/text/stated_frame.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/json_file.h"
-#include "io/images/image.h"
-#include "io/scenes/depth_file.h"
-#include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/photograph_cache.h"
 
@@ -69,26 +67,6 @@ bool is_done(const Run& run, const StageFiles& stage) {
 }
 
 Json result_of(const Run& run, Stage stage) { return run.record.result(traits(stage).name); }
-
-// Loads every photograph before anything is written: a run must not stop halfway, or leave a folder
-// behind, because of a damaged file. Those that the run works with stay in the cache.
-void refuse_unreadable_images(const Scene& scene) {
-  std::set<int> used(scene.input.begin(), scene.input.end());
-  used.insert(scene.held_out.begin(), scene.held_out.end());
-  std::vector<std::string> told_when_used;
-  for (size_t i = 0; i < scene.views.size(); ++i) {
-    if (scene.views[i].image_path.empty()) continue;
-    if (used.count(static_cast<int>(i)) > 0) {
-      (void)loaded_view(scene, static_cast<int>(i), /*with_image=*/true, told_when_used);
-    } else {
-      (void)read_image(scene.views[i].image_path);
-    }
-  }
-  for (const int i : scene.input) {
-    const View& view = scene.views[static_cast<size_t>(i)];
-    if (!view.depth_path.empty()) (void)read_depth_file(view.depth_path);
-  }
-}
 
 // What photographs may be kept in [bytes]: some of what no stage needs.
 size_t spare_memory(const std::vector<StageMemory>& plan, size_t budget) {
@@ -399,7 +377,8 @@ FinishedRun run_pipeline(const RunRequest& request,
   const size_t budget = memory_budget(request.memory_limit);
   check_memory_plan(scene, work, budget);
   scene.cache = std::make_shared<PhotographCache>(spare_memory(plan, budget));
-  refuse_unreadable_images(scene);
+  refuse_unreadable(scene, budget, terminal.begin("reading photographs"));
+  (void)terminal.end("");
   const size_t known = scene.warnings.size();
   const Json fit = camera_fit_to_json(check_stated_cameras(opened, terminal));
   terminal.warn(std::vector(scene.warnings.begin() + std::ptrdiff_t(known), scene.warnings.end()));
