@@ -42,6 +42,24 @@ TrainingOptions options_of(const TrainArgs& args) {
   return options;
 }
 
+// The scale that was measured, which becomes that of the model; null where none was.
+nlohmann::ordered_json settle_scale(const OpenedScene& opened,
+                                    const std::vector<KnownDistance>& distances,
+                                    const std::vector<MarkerBar>& markers,
+                                    Model& model,
+                                    const Terminal& terminal) {
+  nlohmann::ordered_json scale;
+  if (opened.control) {
+    scale = control_to_json(*opened.control);
+  } else if (const auto by_distances = scale_by(distances, markers, model)) {
+    terminal.warn(by_distances->warnings);
+    scale = distances_to_json(*by_distances);
+  }
+  widen_by_focal(model.scene.frame, opened.focal_sigma());
+  if (scale.is_object()) scale["metres_sigma"] = model.scene.frame.metres_sigma;
+  return scale;
+}
+
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
   keep_scene_apart(args.output, args.scene.path, {"priors", "colmap"});
@@ -66,10 +84,8 @@ void run_train(const TrainArgs& args) {
   const NewFolder folder(args.output);
   const FolderLock lock(args.output);
   refuse_to_replace_model(args.output, args.overwrite);  // another start may have ended since
-  OpenedScene opened =
-      open_scene(args.scene, args.output, terminal, [&](const OpenedScene& solved) {
-        solved.keep(args.output);  // whatever is refused later
-      });
+  const auto keep = [&](const OpenedScene& solved) { solved.keep(args.output); };
+  OpenedScene opened = open_scene(args.scene, args.output, terminal, keep);
   check_training_memory(opened.scene, budget, request.training);
   (void)check_stated_cameras(opened, terminal);
   remove_abandoned_files(args.output);
@@ -88,18 +104,9 @@ void run_train(const TrainArgs& args) {
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
   if (opened.refined) report["refined_poses"] = refinement_to_json(opened.refined->report);
-  nlohmann::ordered_json scale;
-  if (opened.control) {
-    scale = control_to_json(*opened.control);
-  } else if (const auto by_distances = scale_by(distances, markers, trained.model)) {
-    terminal.warn(by_distances->warnings);
-    scale = distances_to_json(*by_distances);
-  }
-  Frame& frame = trained.model.scene.frame;
-  widen_by_focal(frame, opened.focal_sigma());
-  if (scale.is_object()) scale["metres_sigma"] = frame.metres_sigma;
+  report["scale"] = settle_scale(opened, distances, markers, trained.model, terminal);
+  const Frame& frame = trained.model.scene.frame;
   if (frame.has_metric_scale()) (void)restate_frame(args.output, trained.model);
-  report["scale"] = scale;
   if (trained.water) report["water"] = water_to_json(*trained.water, frame);
   write_file(args.output / "training.json", json_text(versioned(report)) + "\n");
   forget_checkpoints(args.output);

@@ -75,6 +75,12 @@ size_t spare_memory(const std::vector<StageMemory>& plan, size_t budget) {
   return std::min(kKeptPhotographs, budget - std::min(budget, most));
 }
 
+Json memory_to_json(const std::vector<StageMemory>& plan) {
+  Json out = Json::object();
+  for (const StageMemory& stage : plan) out[traits(stage.stage).title] = stage.bytes;
+  return out;
+}
+
 Model& loaded_model(Run& run) {
   if (!run.model) {
     run.model = read_model(run.request.output / "model");
@@ -397,9 +403,7 @@ FinishedRun run_pipeline(const RunRequest& request,
                    decided_stages(request, scene));
   remove_all_abandoned_files(request.output);
   opened.keep(request.output / "model");
-  Json predicted = Json::object();
-  for (const StageMemory& stage : plan) predicted[traits(stage.stage).title] = stage.bytes;
-  record.note("predicted_memory", predicted);
+  record.note("predicted_memory", memory_to_json(plan));
   record.note("camera_fit", fit);
   const Json refined = opened.refined ? refinement_to_json(opened.refined->report) : Json();
   record.note("refined_poses", refined);
