@@ -25,6 +25,8 @@ void append(Gaussians& g, const Gaussians& more) {
   const auto add = [](auto& to, const auto& from) {
     to.insert(to.end(), from.begin(), from.end());
   };
+  add(g.synthetic_sources, more.synthetic_sources);
+  if (more.size() == 0) return;  // nothing comes that could lack labels
   const bool is_labelled = (before == 0 || !g.provenance.empty()) && !more.provenance.empty();
   if (is_labelled) add(g.provenance, more.provenance);
   if (!is_labelled) g.provenance.clear();
@@ -35,7 +37,6 @@ void append(Gaussians& g, const Gaussians& more) {
     }
     g.synthetic.resize(before + more.size(), 0);
   }
-  add(g.synthetic_sources, more.synthetic_sources);
   add(g.position, more.position);
   add(g.scale, more.scale);
   add(g.rotation, more.rotation);

@@ -50,7 +50,8 @@ struct Gaussians {
 /// How many are made up.
 size_t synthetic_count(const Gaussians& gaussians);
 
-/// Appends Gaussians; harmonics that they lack are 0. Labels that either set lacks, both lose.
+/// Appends Gaussians; harmonics that they lack are 0. Labels that either set lacks, both lose; a
+/// set without Gaussians lacks none.
 /// \throws InvalidInput if `more` has harmonics of a higher degree, or there are more than 255
 ///         sources together
 void append(Gaussians& gaussians, const Gaussians& more);

@@ -61,5 +61,17 @@ TEST(Append, KeepsLabelsWhereBothHaveThem) {
   EXPECT_EQ(none.provenance, labelled.provenance);
 }
 
+// As a painted picture is from which nothing could be lifted.
+TEST(Append, OfNothingAddsItsSourceAndTakesNoLabels) {
+  Gaussians all = test::varied_splats(2, 0);
+  all.provenance.assign(2, Provenance::Observed);
+  Gaussians nothing;
+  nothing.synthetic_sources = {{"a.png", "1"}};
+  append(all, nothing);
+  EXPECT_EQ(all.provenance, std::vector<Provenance>(2, Provenance::Observed));
+  EXPECT_EQ(all.synthetic_sources.size(), 1u);
+  EXPECT_EQ(all.size(), 2u);
+}
+
 }  // namespace
 }  // namespace cgs::gaussians_test
