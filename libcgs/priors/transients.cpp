@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
@@ -243,27 +244,33 @@ class Transients {
     return true;
   }
 
-  // Whether something at a place before that depth, which two others show alike, is what the pixel
-  // shows.
+  // Whether something at a place before that depth is what the pixel shows: two others show it
+  // alike, or the only one that has the place in its picture does.
   bool is_explained(size_t i, int x, int y, float depth) const {
     constexpr double kNearest = 0.2;  // of the depth
     constexpr int kTried = 128;
     for (int k = 0; k < kTried; ++k) {
       const double share = 1 + (1 / kNearest - 1) * k / (kTried - 1);
       int shown = 0;
+      int framed = 0;
       for (const size_t j : others_[i]) {
-        if (is_alike(views_[i], x, y, double{depth} / share, views_[j]) && ++shown == 2) break;
+        const auto alike = is_alike(views_[i], x, y, double{depth} / share, views_[j]);
+        framed += alike ? 1 : 0;
+        shown += alike.value_or(false) ? 1 : 0;
+        if (shown == 2) return true;
       }
-      if (shown >= 2) return true;
+      if (shown == 1 && framed == 1) return true;
     }
     return false;
   }
 
-  static bool is_alike(const SmallView& view, int x, int y, double depth, const SmallView& other) {
+  // Nothing where the other has none of the place in its picture.
+  static std::optional<bool> is_alike(
+      const SmallView& view, int x, int y, double depth, const SmallView& other) {
     constexpr int kRadius = 2;
     const Eigen::Vector3d uvz =
         other.camera.project(view.camera.unproject(x + 0.5, y + 0.5, depth));
-    if (!other.camera.sees(uvz)) return false;
+    if (!other.camera.sees(uvz)) return std::nullopt;
     const int dx = static_cast<int>(uvz.x()) - x;
     const int dy = static_cast<int>(uvz.y()) - y;
     float sum = 0;
@@ -275,7 +282,8 @@ class Transients {
         ++count;
       }
     }
-    return count > 0 && sum < kSameColor * static_cast<float>(count);
+    if (count == 0) return std::nullopt;
+    return sum < kSameColor * static_cast<float>(count);
   }
 
   static MaskMap at_full_size(const MaskMap& small, int factor, int width, int height) {

@@ -14,8 +14,9 @@ namespace cgs {
 ///
 /// A pixel shows it where two other photographs measured one surface behind and agree on its
 /// colour, the pixel has another, and no place between its camera and that surface explains it in
-/// two others as well: what stands still before a surface would be found there. With two
-/// photographs nobody can tell which of them is right, and nothing is found.
+/// two others as well, or in the only other that has the place in its picture: what stands still
+/// before a surface would be found there. With two photographs nobody can tell which of them is
+/// right, and nothing is found.
 /// \param priors  of plane_sweep(), or later
 /// \pre images of scene.input are loaded
 /// Source: robust photo-consistency between views, as Sabour et al. 2023, "RobustNeRF", uses it
