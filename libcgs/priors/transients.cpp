@@ -247,10 +247,9 @@ class Transients {
   // Whether something at a place before that depth is what the pixel shows: two others show it
   // alike, or the only one that has the place in its picture does.
   bool is_explained(size_t i, int x, int y, float depth) const {
-    constexpr double kNearest = 0.2;  // of the depth
-    constexpr int kTried = 128;
-    for (int k = 0; k < kTried; ++k) {
-      const double share = 1 + (1 / kNearest - 1) * k / (kTried - 1);
+    const int tried = places_before(i, x, y, double{depth});
+    for (int k = 0; k < tried; ++k) {
+      const double share = 1 + (1 / kNearest - 1) * k / (tried - 1);
       int shown = 0;
       int framed = 0;
       for (const size_t j : others_[i]) {
@@ -262,6 +261,25 @@ class Transients {
       if (shown == 1 && framed == 1) return true;
     }
     return false;
+  }
+
+  // As many that from one to the next it is about two pixels in the others, within bounds.
+  int places_before(size_t i, int x, int y, double depth) const {
+    constexpr double kStep = 2;  // [pixels]
+    constexpr double kFewest = 128;
+    constexpr double kMost = 512;
+    const Camera& camera = views_[i].camera;
+    const Eigen::Vector3d last = camera.unproject(x + 0.5, y + 0.5, depth);
+    const Eigen::Vector3d first = camera.unproject(x + 0.5, y + 0.5, kNearest * depth);
+    double longest = 0;
+    for (const size_t j : others_[i]) {
+      const Eigen::Vector3d from = views_[j].camera.project(last);
+      const Eigen::Vector3d to = views_[j].camera.project(first);
+      const bool is_before_camera = from.z() > 0 && to.z() > 0;
+      const double way = is_before_camera ? (to - from).head<2>().norm() : kStep * kMost;
+      longest = std::max(longest, way);
+    }
+    return static_cast<int>(std::clamp(longest / kStep, kFewest, kMost));
   }
 
   // Nothing where the other has none of the place in its picture.
@@ -297,6 +315,8 @@ class Transients {
     }
     return out;
   }
+
+  static constexpr double kNearest = 0.2;  // place before a surface, part of its depth
 
   std::vector<SmallView> views_;
   std::vector<int> factor_;
