@@ -135,7 +135,7 @@ class ResponseFit {
     out.residual = mean_residual(unknowns_);
     for (const Term& term : kTerms) {
       const bool needs_first = term.first == kVignetteAt + 1 && !out.terms.back().is_used;
-      out.terms.push_back(needs_first ? ResponseTerm{term.name} : tried(term, out.samples));
+      out.terms.push_back(needs_first ? not_tried(term) : tried(term, out.samples));
     }
     // Once more with what is fitted best: what a photograph shows otherwise counts least then.
     if (out.is_richer()) {
@@ -196,9 +196,16 @@ class ResponseFit {
     return !is_grey_[v] || (!is_matrix && unknown != kGainAt + 1 && unknown != kGainAt + 2);
   }
 
+  // What stands without it is left of the differences.
+  ResponseTerm not_tried(const Term& term) const {
+    ResponseTerm out{term.name};
+    out.residual = mean_residual(unknowns_);
+    return out;
+  }
+
   ResponseTerm tried(const Term& term, size_t places) {
     const std::vector<Unknowns> before = unknowns_;
-    ResponseTerm out{term.name};
+    ResponseTerm out = not_tried(term);
     std::array<bool, kUnknowns> used = used_;
     for (int k = term.first; k < term.first + term.count; ++k) {
       used.at(static_cast<size_t>(k)) = true;

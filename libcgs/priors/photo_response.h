@@ -15,7 +15,8 @@ struct ResponseTerm {
   std::string name;       ///< gain, gamma, vignette, vignette of two terms, matrix
   int parameters = 0;     ///< That it adds, of all photographs together.
   double saved_bits = 0;  ///< By which the differences get shorter, less what its parameters cost.
-  double residual = 0;    ///< Mean difference with it, of sRGB-coded values.
+  double residual = 0;    ///< Mean difference with it, of sRGB-coded values; where it was not
+                          ///< tried, that without it.
   bool is_used = false;
 };
 

@@ -59,6 +59,18 @@ TEST(PhotoResponses, AreGainsWhereGainsAreEnough) {
   EXPECT_NEAR(found.gain[0].x() * 0.7f, 1, 0.02);
 }
 
+// A second term of the vignette is not tried where the first does not pay: it has what stands.
+TEST(PhotoResponses, StateTheDifferenceThatIsLeftOfTermsThatWereNotTried) {
+  test::ColoredWall wall;
+  test::print(wall.scene.views[0].image, {0.7, 0.8, 0.75}, 1, 0);
+  const std::vector<ResponseTerm> terms = fit_photo_responses(wall.scene, wall.priors).terms;
+  ASSERT_EQ(terms.size(), 5u);
+  ASSERT_FALSE(terms[2].is_used);
+  EXPECT_EQ(terms[3].parameters, 0);
+  EXPECT_GT(terms[3].residual, 0);
+  EXPECT_NEAR(terms[3].residual, terms[2].residual, 0.02 * terms[2].residual);
+}
+
 TEST(PhotoResponses, RecoverGammaAndGain) {
   test::ColoredWall wall;
   const Scene clean = wall.scene;
