@@ -273,7 +273,8 @@ class SkyFinder {
         const int v = y + k * d.dy;
         if (!sky_.contains(u, v)) break;
         if (sky_(u, v) == 0) continue;
-        return (colors_(u, v) - colors_(x, y)).cwiseAbs().maxCoeff() < kSame;
+        if ((colors_(u, v) - colors_(x, y)).cwiseAbs().maxCoeff() < kSame) return true;
+        break;  // this way; another may lead to the like
       }
     }
     return false;

@@ -192,6 +192,28 @@ TEST(FindSky, LooksThroughBarsAndLeavesTheBars) {
   EXPECT_GT(count_in(sky, 21, kRail + 1, 218, kFoot), 0.7 * 197 * (kFoot - kRail));
 }
 
+// Between two bars, of which the sky left of the one is what it shows, and that right of the other
+// is paler.
+TEST(FindSky, LooksThroughBarsBesideSkyOfAnotherShade) {
+  constexpr int kSide = 240;
+  constexpr int kRail = 80;
+  constexpr int kFoot = 110;
+  const auto bar = [](int x, int y) -> Vector3f { return 0.3f * ground(x, y); };
+  Photo photo(kSide, kSide * 3 / 4, [](int x, int y) -> Vector3f {
+    if (y >= kFoot) return ground(x, y);
+    return x < 106 ? Vector3f(0.35f, 0.55f, 0.9f) : Vector3f(0.5f, 0.68f, 0.92f);
+  });
+  for (int y = 0; y < kFoot; ++y) {
+    for (int x = 0; x < kSide; ++x) photo.truth(x, y) = 1;
+  }
+  photo.paint(99, kRail, 107, kRail + 1, bar);
+  photo.paint(99, kRail, 100, kFoot, bar);
+  photo.paint(106, kRail, 107, kFoot, bar);
+  const MaskMap sky = photo.sky();
+  expect_all_of_it(photo, sky);
+  EXPECT_GT(count_in(sky, 100, kRail + 1, 106, kFoot), 0.7 * 6 * (kFoot - kRail));
+}
+
 TEST(FindSky, IsNotTakenInByAWindowThatMirrorsIt) {
   Photo photo = sky_above_ground(blue);
   photo.paint(40, 64, 58, 82, [](int x, int y) { return blue(x, y / 2); });
