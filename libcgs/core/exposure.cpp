@@ -19,12 +19,6 @@ namespace cgs {
 namespace {
 
 constexpr size_t kFewestSamples = 100;  // below, a pair of views says nothing
-constexpr float kDarkest = 0.04f;       // sRGB-coded
-constexpr float kBrightest = 0.98f;
-
-bool tells_exposure(const Eigen::Vector3f& color) {
-  return color.minCoeff() > kDarkest && color.maxCoeff() < kBrightest;
-}
 
 /// Colour where a view shows a point, bilinear; NaN where it is clipped or nearly black.
 Eigen::Vector3f color_at(const View& view, const Eigen::Vector3d& point) {
@@ -109,6 +103,12 @@ Eigen::VectorXd log_gains(const std::vector<Pair>& pairs, size_t views, size_t c
 }
 
 }  // namespace
+
+bool tells_exposure(const Eigen::Vector3f& color) {
+  constexpr float kDarkest = 0.04f;
+  constexpr float kBrightest = 0.98f;
+  return color.minCoeff() > kDarkest && color.maxCoeff() < kBrightest;
+}
 
 ExposureGains exposure_gains(std::span<const View* const> views,
                              const std::vector<std::pair<size_t, size_t>>& compared,

@@ -21,6 +21,10 @@ struct ExposureGains {
   float difference() const;
 };
 
+/// Whether an sRGB-coded colour is neither clipped nor nearly black, so that it tells how much
+/// light there was.
+bool tells_exposure(const Eigen::Vector3f& color);
+
 /// Points of the surface that views `a` and `b` both show, in the frame of their cameras. Any
 /// number of threads may ask at once.
 using SharedSurface = std::function<std::vector<Eigen::Vector3d>(size_t a, size_t b)>;

@@ -12,6 +12,7 @@
 
 #include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/thinned.h"
 
 namespace cgs {
 
@@ -22,15 +23,6 @@ struct Sight {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   std::vector<size_t> seen_by;
 };
-
-// As many at most, evenly spread.
-template <typename T>
-std::vector<T> some_of(const std::vector<T>& all, size_t most) {
-  if (all.size() <= most) return all;
-  std::vector<T> out;
-  for (size_t i = 0; i < most; ++i) out.push_back(all[i * all.size() / most]);
-  return out;
-}
 
 // The first of each place: a tripod's photographs, or copies of one.
 std::vector<int> in_different_places(const Scene& scene, const std::vector<int>& candidates) {
@@ -59,7 +51,7 @@ std::vector<Sight> known_sights(const Scene& scene, const std::vector<int>& cand
     }
   }
   std::vector<Sight> out;
-  for (const SparsePoint* const point : some_of(shared, kMost)) {
+  for (const SparsePoint* const point : thinned(shared, kMost)) {
     Sight& sight = out.emplace_back();
     sight.position = point->position;
     for (const int view : point->views) {
@@ -80,7 +72,7 @@ std::vector<Sight> guessed_sights(const Scene& scene, const std::vector<int>& ca
   Scene all;
   all.folder = scene.folder;
   all.views = scene.views;
-  all.points = some_of(scene.points, kMostPoints);
+  all.points = thinned(scene.points, kMostPoints);
   all.input = candidates;
   const std::vector<Eigen::Vector3d> subject = subject_points(all);  // camera, subject, camera, …
   std::vector<Sight> out;
@@ -224,7 +216,7 @@ std::vector<int> choose_input_views(const Scene& scene,
   require(candidates.size() >= 2, "views to choose among", candidates.size());
   require(count >= 2, "views to choose", count);
   constexpr size_t kMostCandidates = 100;
-  const std::vector<int> some = some_of(in_different_places(scene, candidates), kMostCandidates);
+  const std::vector<int> some = thinned(in_different_places(scene, candidates), kMostCandidates);
   if (some.size() < 2) return {};
   std::vector<Sight> sights = known_sights(scene, some);
   constexpr size_t kEnough = 50;

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/core/split_mix.h"
 
 namespace cgs {
 
@@ -15,12 +16,6 @@ namespace {
 
 constexpr size_t kFewestOfAFit = 50;
 constexpr double kNormal = 1.4826;  // median distance to standard deviation
-
-uint64_t hashed(uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-  return x ^ (x >> 31);
-}
 
 double off(const LineFit& line, const FitPoint& p) {
   const double value = line.at(p.x);
@@ -60,8 +55,8 @@ LineFit least_median_line(const std::vector<FitPoint>& points) {
   for (size_t i = 0; i < points.size(); i += step) judges.push_back(points[i]);
   LineFit best{0, 0, std::numeric_limits<double>::infinity()};
   for (uint64_t k = 0; k < kPairs; ++k) {
-    const FitPoint& a = points[hashed(2 * k + 1) % points.size()];
-    const FitPoint& b = points[hashed(2 * k + 2) % points.size()];
+    const FitPoint& a = points[split_mix(2 * k + 1) % points.size()];
+    const FitPoint& b = points[split_mix(2 * k + 2) % points.size()];
     if (a.x == b.x) continue;
     LineFit line;
     line.scale = (b.y - a.y) / (b.x - a.x);

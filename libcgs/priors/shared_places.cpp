@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "libcgs/core/exposure.h"
 #include "libcgs/core/srgb.h"
 #include "libcgs/priors/shown_pixel.h"
 
@@ -24,15 +25,12 @@ double coded_mean(const Eigen::Vector3d& light) {
 }  // namespace
 
 ColorImage smooth_light(const View& view) {
-  constexpr float kDarkest = 0.04f;
-  constexpr float kBrightest = 0.98f;
   const ColorImage& image = view.image;
   const Eigen::Vector3f unknown = Eigen::Vector3f::Constant(std::nanf(""));
   ColorImage light(image.width, image.height, unknown);
   for (size_t i = 0; i < image.data.size(); ++i) {
     const Eigen::Vector3f& color = image.data[i];
-    const bool is_clipped = color.minCoeff() <= kDarkest || color.maxCoeff() >= kBrightest;
-    if (is_clipped || !view.is_usable(i)) continue;
+    if (!tells_exposure(color) || !view.is_usable(i)) continue;
     light.data[i] = color.unaryExpr(&linear_from_srgb);
   }
   ColorImage out(image.width, image.height, unknown);

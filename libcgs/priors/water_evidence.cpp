@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -200,11 +199,7 @@ WaterEvidence water_evidence(const Scene& scene, const std::vector<ViewPriors>& 
   require(priors.size() == scene.input.size(),
           "water_evidence: number of priors must be that of the input views",
           priors.size());
-  std::set<std::pair<size_t, size_t>> compared;
-  for (size_t i = 0; i < priors.size(); ++i) {
-    for (const size_t j : neighbours(scene, i, kMostCompared)) compared.insert(std::minmax(i, j));
-  }
-  const std::vector<std::pair<size_t, size_t>> pairs(compared.begin(), compared.end());
+  const std::vector<std::pair<size_t, size_t>> pairs = neighbouring_pairs(scene);
   const auto places = [&](size_t k) {
     return PlacesOf(scene.views[static_cast<size_t>(scene.input[k])], priors[k]);
   };
