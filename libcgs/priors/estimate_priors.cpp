@@ -161,13 +161,11 @@ class Estimator {
     const bool are_guesses =
         given.kind == DepthKind::Relative || given.kind == DepthKind::Disparity;
     if (!are_guesses) return out;
-    std::vector<Camera> cameras;
     for (size_t i = 0; i < out.size(); ++i) {
-      cameras.push_back(view(i).camera);
       if (given.views[i].depth.empty()) continue;
       out[i] = guess_depth(given.views[i], view(i), out_.views[i]);
     }
-    remove_contradictions(cameras, given.views, out_.views, out);
+    remove_contradictions(scene_, given.views, out_.views, out);
     return out;
   }
 

@@ -71,6 +71,7 @@ class Sharing {
   Sharing(const Scene& scene, std::vector<ViewPriors>& priors) : priors_(priors) {
     for (const int i : scene.input) {
       cameras_.push_back(&scene.views[static_cast<size_t>(i)].camera);
+      cam_from_world_.push_back(cameras_.back()->cam_from_world());
       footprints_.push_back(footprints(*cameras_.back(), priors[footprints_.size()].depth));
     }
   }
@@ -95,7 +96,7 @@ class Sharing {
     const float z = own.depth(x, y);
     if (!(z > 0)) return false;
     const Eigen::Vector3d point = cameras_[view]->unproject(x + 0.5, y + 0.5, double(z));
-    const Eigen::Vector3d uvz = cameras_[other]->project(point);
+    const Eigen::Vector3d uvz = cameras_[other]->project_in_cam(cam_from_world_[other] * point);
     if (!cameras_[other]->sees(uvz)) return false;
     const auto u0 = static_cast<int>(std::floor(uvz.x() - 0.5));
     const auto v0 = static_cast<int>(std::floor(uvz.y() - 0.5));
@@ -146,6 +147,7 @@ class Sharing {
 
   std::vector<ViewPriors>& priors_;
   std::vector<const Camera*> cameras_;
+  std::vector<Eigen::Isometry3d> cam_from_world_;  // inverted once, not at each pixel
   std::vector<Raster<float>> footprints_;
 };
 

@@ -13,6 +13,7 @@
 #include "libcgs/core/split_mix.h"
 #include "libcgs/priors/depth_fit.h"
 #include "libcgs/priors/directions.h"
+#include "libcgs/priors/neighbours.h"
 
 namespace cgs {
 
@@ -218,6 +219,43 @@ bool floats(double z, double sigma, const Shown& shown) {
   return double(shown.depth) > z + margin;  // not if nothing is shown
 }
 
+/// An input view and all that is known of what it shows.
+struct GuessingView {
+  const Camera& camera;
+  const FittedDepth& fitted;
+  const ViewPriors& priors;
+  const DepthGuess& guess;
+};
+
+// Marks the guesses of one view that would float before what another shows, and those of the other
+// that they contradict.
+void mark_contradicted(const GuessingView& here,
+                       const GuessingView& there,
+                       MaskMap& of_here,
+                       MaskMap& of_there) {
+  const DepthMap& depth = here.guess.depth;
+  const Eigen::Isometry3d there_from_here =
+      there.camera.cam_from_world() * here.camera.world_from_cam;
+  std::vector<std::vector<size_t>> met(static_cast<size_t>(depth.height));  // by row
+  tbb::parallel_for(0, depth.height, [&](int y) {
+    for (int x = 0; x < depth.width; ++x) {
+      if (!(depth(x, y) > 0)) continue;
+      const Eigen::Vector3d uvz = there.camera.project_in_cam(
+          there_from_here * (double(depth(x, y)) * here.camera.ray_in_cam(x + 0.5, y + 0.5)));
+      if (!there.camera.sees(uvz)) continue;
+      const auto u = static_cast<int>(uvz.x());
+      const auto v = static_cast<int>(uvz.y());
+      const Shown shown = shown_at(there.fitted, there.priors, there.guess, u, v);
+      if (!floats(uvz.z(), double(here.guess.sigma(x, y)), shown)) continue;
+      of_here(x, y) = 1;
+      if (shown.is_guess) met[static_cast<size_t>(y)].push_back(of_there.index(u, v));
+    }
+  });
+  for (const std::vector<size_t>& row : met) {
+    for (const size_t pixel : row) of_there.data[pixel] = 1;
+  }
+}
+
 }  // namespace
 
 DepthGuess guess_depth(const FittedDepth& fitted, const View& view, const ViewPriors& priors) {
@@ -243,7 +281,7 @@ DepthGuess guess_depth(const FittedDepth& fitted, const View& view, const ViewPr
   return out;
 }
 
-void remove_contradictions(const std::vector<Camera>& cameras,
+void remove_contradictions(const Scene& scene,
                            const std::vector<FittedDepth>& fitted,
                            const std::vector<ViewPriors>& priors,
                            std::vector<DepthGuess>& guesses) {
@@ -251,26 +289,14 @@ void remove_contradictions(const std::vector<Camera>& cameras,
   for (const DepthGuess& guess : guesses) {
     contradicted.emplace_back(guess.depth.width, guess.depth.height, uint8_t{0});
   }
+  const auto view = [&](size_t i) {
+    const Camera& camera = scene.views[static_cast<size_t>(scene.input[i])].camera;
+    return GuessingView{camera, fitted[i], priors[i], guesses[i]};
+  };
   for (size_t i = 0; i < guesses.size(); ++i) {
     if (guesses[i].depth.empty()) continue;
-    const DepthMap& depth = guesses[i].depth;
-    for (size_t j = 0; j < guesses.size(); ++j) {
-      if (j == i) continue;
-      const Eigen::Isometry3d j_from_i = cameras[j].cam_from_world() * cameras[i].world_from_cam;
-      for (int y = 0; y < depth.height; ++y) {
-        for (int x = 0; x < depth.width; ++x) {
-          if (!(depth(x, y) > 0)) continue;
-          const Eigen::Vector3d uvz = cameras[j].project_in_cam(
-              j_from_i * (double(depth(x, y)) * cameras[i].ray_in_cam(x + 0.5, y + 0.5)));
-          if (!cameras[j].sees(uvz)) continue;
-          const auto u = static_cast<int>(uvz.x());
-          const auto v = static_cast<int>(uvz.y());
-          const Shown shown = shown_at(fitted[j], priors[j], guesses[j], u, v);
-          if (!floats(uvz.z(), double(guesses[i].sigma(x, y)), shown)) continue;
-          contradicted[i](x, y) = 1;
-          if (shown.is_guess) contradicted[j](u, v) = 1;
-        }
-      }
+    for (const size_t j : neighbours(scene, i, kMostCompared)) {
+      mark_contradicted(view(i), view(j), contradicted[i], contradicted[j]);
     }
   }
   for (size_t i = 0; i < guesses.size(); ++i) {

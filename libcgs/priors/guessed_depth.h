@@ -26,12 +26,13 @@ struct DepthGuess {
 /// \param priors  of plane_sweep() after alignment, not completed
 DepthGuess guess_depth(const FittedDepth& fitted, const View& view, const ViewPriors& priors);
 
-/// Takes out guesses that contradict another view: those that would stand before what it measured,
-/// and both where two guesses contradict each other. Measured pixels that the given depth of their
-/// own view contradicts have no say: beside surfaces without texture they are often wrong.
+/// Takes out guesses that contradict one of the neighbours() of their view: those that would stand
+/// before what it measured, and both where two guesses contradict each other. Measured pixels that
+/// the given depth of their own view contradicts have no say: beside surfaces without texture they
+/// are often wrong.
 ///
-/// \param cameras, fitted, priors  of the input views, in one order; priors not completed
-void remove_contradictions(const std::vector<Camera>& cameras,
+/// \param fitted, priors  of the input views, in their order; priors not completed
+void remove_contradictions(const Scene& scene,
                            const std::vector<FittedDepth>& fitted,
                            const std::vector<ViewPriors>& priors,
                            std::vector<DepthGuess>& guesses);

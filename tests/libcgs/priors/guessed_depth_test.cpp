@@ -189,9 +189,12 @@ INSTANTIATE_TEST_SUITE_P(Views, GuessedDepth, testing::Values(2, 3));
 
 TEST(RemoveContradictions, TakesOutWhatFloatsBeforeOtherViews) {
   const float nan = std::nanf("");
-  std::vector<Camera> cameras(2,
-                              {.width = 60, .height = 20, .fx = 60, .fy = 60, .cx = 30, .cy = 10});
-  cameras[1].world_from_cam.translation().x() = 0.5;
+  View view;
+  view.camera = {.width = 60, .height = 20, .fx = 60, .fy = 60, .cx = 30, .cy = 10};
+  Scene scene;
+  scene.views.assign(2, view);
+  scene.views[1].camera.world_from_cam.translation().x() = 0.5;
+  scene.input = {0, 1};
   ViewPriors none{DepthMap(60, 20, nan),
                   DepthMap(60, 20, nan),
                   Raster<float>(60, 20, 0.0f),
@@ -223,7 +226,7 @@ TEST(RemoveContradictions, TakesOutWhatFloatsBeforeOtherViews) {
   fitted[1] = {DepthMap(60, 20, 5), 0.01};
   fitted[1].depth(48, 10) = 4;
   guess(0, 57, 3.3f);  // lands there, at 48
-  remove_contradictions(cameras, fitted, priors, guesses);
+  remove_contradictions(scene, fitted, priors, guesses);
   EXPECT_EQ(guesses[0].depth(57, 10), 3.3f);
   EXPECT_EQ(guesses[0].depth(50, 10), 5);
   EXPECT_TRUE(std::isnan(guesses[0].depth(59, 10)));
