@@ -52,7 +52,11 @@ struct PictureObject {
   std::optional<ColorImage> filled;
 };
 
-/// \param camera  in `frame` [internal units]
-PictureObject picture_object(RenderBuffers buffers, const Camera& camera, const Frame& frame);
+/// \param camera      in `frame` [internal units]
+/// \param background  of picture()
+PictureObject picture_object(RenderBuffers buffers,
+                             const Camera& camera,
+                             const Frame& frame,
+                             const Eigen::Vector3f& background = Eigen::Vector3f::Zero());
 
 }  // namespace cgs

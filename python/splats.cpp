@@ -134,9 +134,10 @@ PictureObject rendered(const SplatsObject& splats,
                        const std::array<float, 3>& background) {
   return result_of(py::none(), [&](Terminal&) {
     const Camera internal = in_frame(camera, splats.frame);
-    RasterizerOptions options;
-    options.background = Eigen::Map<const Eigen::Vector3f>(background.data());
-    return picture_object(rasterize(splats.gaussians, internal, options), internal, splats.frame);
+    const RasterizerOptions behind{.background = Eigen::Vector3f(background.data())};
+    behind.validate();
+    return picture_object(
+        rasterize(splats.gaussians, internal), internal, splats.frame, behind.background);
   });
 }
 
@@ -156,9 +157,10 @@ auto own_raster(Raster<T> PictureObject::*member) {
 
 void add_picture(py::module_& module) {
   py::class_<PictureObject>(module, "Picture", "What a camera sees of splats or of a model.")
-      .def_property_readonly("color",
-                             own_raster(&PictureObject::color),
-                             "Height x width x 3, float32; black where nothing is drawn.")
+      .def_property_readonly(
+          "color",
+          own_raster(&PictureObject::color),
+          "Height x width x 3, float32; black, or the background, where nothing is drawn.")
       .def_property_readonly(
           "filled",
           [](const py::object& self) {
@@ -209,9 +211,12 @@ void add_picture(py::module_& module) {
 
 }  // namespace
 
-PictureObject picture_object(RenderBuffers buffers, const Camera& camera, const Frame& frame) {
+PictureObject picture_object(RenderBuffers buffers,
+                             const Camera& camera,
+                             const Frame& frame,
+                             const Eigen::Vector3f& background) {
   PictureObject out;
-  out.color = picture(buffers);
+  out.color = picture(buffers, background);
   out.depth = buffers.median_depth;
   if (!buffers.hole.empty()) {
     for (size_t i = 0; i < out.depth.data.size(); ++i) {
@@ -274,12 +279,14 @@ void add_splats(py::module_& module) {
                std::to_string(s.gaussians.sh_degree) + ">";
       });
   splats
-      .def("render",
-           rendered,
-           py::arg("camera"),
-           py::kw_only(),
-           py::arg("background") = std::array<float, 3>{0, 0, 0},
-           "The Picture that a camera takes of them.")
+      .def(
+          "render",
+          rendered,
+          py::arg("camera"),
+          py::kw_only(),
+          py::arg("background") = std::array<float, 3>{0, 0, 0},
+          "The Picture that a camera takes of them. background: the colour where nothing is drawn, "
+          "and behind what covers less than half of a pixel.")
       .def("save",
            save,
            py::arg("path"),

@@ -46,11 +46,15 @@ PulledLevel shown_pixels(const ColorImage& shown, const RenderBuffers& buffers) 
 
 }  // namespace
 
-ColorImage picture(const RenderBuffers& buffers) {
+ColorImage picture(const RenderBuffers& buffers, const Eigen::Vector3f& background) {
   ColorImage out = buffers.color;
   for (size_t i = 0; i < out.data.size(); ++i) {
     const float alpha = buffers.alpha.data[i];
-    if (alpha >= kShown) out.data[i] /= alpha;
+    if (alpha >= kShown) {
+      out.data[i] /= alpha;
+    } else {
+      out.data[i] += (1 - alpha) * background;
+    }
     out.data[i] = out.data[i].cwiseMax(0.0f).cwiseMin(1.0f);
   }
   return out;

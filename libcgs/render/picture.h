@@ -6,9 +6,12 @@
 
 namespace cgs {
 
-/// The rendered colour as a picture: divided by alpha where alpha reaches one half, black in holes
-/// without colour. Values in [0, 1].
-ColorImage picture(const RenderBuffers& buffers);
+/// The rendered colour as a picture: divided by alpha where alpha reaches one half, so that it is
+/// that of the surface alone; elsewhere what is drawn lies over the background, which holes without
+/// colour show. Values in [0, 1].
+/// \pre the buffers are drawn on black, the default of RasterizerOptions::background
+ColorImage picture(const RenderBuffers& buffers,
+                   const Eigen::Vector3f& background = Eigen::Vector3f::Zero());
 
 /// picture() for people to look at: what less than half of a pixel covers is filled up with the
 /// colours around it, those of the far side where one side is nearer than the other, as gaps open

@@ -477,6 +477,19 @@ class Splats(unittest.TestCase):
         )
         self.assertIsNone(picture.hole)
 
+    def test_are_drawn_before_a_background(self):
+        camera = cgs.Camera(33, 33, 30, 30, 16.5, 16.5)
+        plain = self.one().render(camera)
+        white = self.one().render(camera, background=(1, 1, 1))
+        covered = plain.alpha >= 0.5
+        self.assertTrue(covered[16, 16])
+        np.testing.assert_array_equal(white.color[covered], plain.color[covered])
+        expected = plain.color + (1 - plain.alpha)[..., None]
+        np.testing.assert_allclose(white.color[~covered], expected[~covered].clip(0, 1), atol=1e-6)
+        np.testing.assert_array_equal(white.filled, plain.filled)
+        with self.assertRaisesRegex(ValueError, "background"):
+            self.one().render(camera, background=(0, np.nan, 0))
+
     def test_come_back_from_their_file(self):
         splats = self.one()
         splats.save(Path(WORK) / "one.ply")

@@ -38,6 +38,21 @@ TEST(Picture, DividesByAlphaAboveOneHalfOnly) {
   EXPECT_NEAR(shown(1, 0).x(), 0.3f, 1e-6f);
 }
 
+// What covers half of a pixel or more is all that it shows, whatever lies behind.
+TEST(Picture, ShowsABackgroundWhereLessThanHalfIsCovered) {
+  RenderBuffers buffers;
+  buffers.color = ColorImage(3, 1, 0.6f * kNear);
+  buffers.alpha = Raster<float>(3, 1, 0.6f);
+  buffers.color(1, 0) = 0.25f * kNear;
+  buffers.alpha(1, 0) = 0.25f;
+  buffers.color(2, 0).setZero();
+  buffers.alpha(2, 0) = 0;
+  const ColorImage shown = picture(buffers, kFar);
+  EXPECT_LT((shown(0, 0) - kNear).norm(), 1e-6f);
+  EXPECT_LT((shown(1, 0) - (0.25f * kNear + 0.75f * kFar)).norm(), 1e-6f);
+  EXPECT_EQ(shown(2, 0), kFar);
+}
+
 TEST(FilledPicture, GoesOnWithTheFarSideBehindAnEdge) {
   for (const int width : {64, 61}) {  // of sizes that halve and that do not
     const RenderBuffers buffers = gap_behind_an_edge(width, 47, 20, 31);
