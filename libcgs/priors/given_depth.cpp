@@ -20,6 +20,7 @@ namespace {
 constexpr float kNotMeasured = std::numeric_limits<float>::quiet_NaN();
 constexpr double kWorstSensor = 0.2;  // relative scatter beyond which depth is not metric
 constexpr double kNoFit = 1;          // scatter that stands for none
+constexpr double kSameUnit = 0.02;    // by which scales differ that are meant to be one
 
 std::string percent(double share) {
   std::array<char, 32> text{};
@@ -127,7 +128,6 @@ class Fitter {
     const double disparity = mean_scatter(lines_[1]);
     const double best = std::min(relative, disparity);
     if (scale_) {
-      constexpr double kSameUnit = 0.02;
       constexpr double kFits = 0.05;
       constexpr double kAboutAsWell = 1.5;
       const bool may_be_metric = states_metres() || std::abs(std::log(stated_scale())) < kSameUnit;
@@ -139,14 +139,19 @@ class Fitter {
     return relative < disparity ? DepthKind::Relative : DepthKind::Disparity;
   }
 
-  // Relative standard deviation of the scale: views err as one, so they are what is counted.
-  double scale_sigma() const {
+  // By how much the scale of each view is off that of all, in logarithms.
+  std::vector<double> scales_of_views() const {
     std::vector<double> logs;
     for (size_t k = 0; k < priors_.size(); ++k) {
       if (!has_depth(k)) continue;
       const auto own = fit_scale(points_of(view(k), priors_[k], DepthKind::Metric));
       if (own) logs.push_back(std::log(own->scale / scale_->scale));
     }
+    return logs;
+  }
+
+  // Relative standard deviation of the scale: views err as one, so they are what is counted.
+  double scale_sigma(const std::vector<double>& logs) const {
     double squares = 0;
     for (const double log : logs) squares += log * log;
     const auto n = double(logs.size());
@@ -155,13 +160,19 @@ class Fitter {
     return std::hypot(kSensorSigma, of_mean);
   }
 
+  // Whether the scale is the one that the cameras were stated in. How its pixels scatter tells
+  // nothing of how far a single view errs as a whole, and would excuse any other unit.
+  bool is_stated_scale(double sigma, size_t views) const {
+    const double within = views > 1 ? kSigmas * sigma : std::min(kSigmas * sigma, kSameUnit);
+    return std::abs(std::log(stated_scale())) < within;
+  }
+
   void leave_out(const std::string& why) {
     out_.kind = DepthKind::Unknown;
     out_.remarks.push_back("the depth files were left out: " + why);
   }
 
   void take_scale() {
-    constexpr double kSigmas = 3;
     const Frame& frame = scene_.frame;
     const bool is_told = scene_.depth_kind == DepthKind::Metric || states_metres();
     double internal_per_metre = 0;
@@ -172,8 +183,9 @@ class Fitter {
       return;
     }
     if (scale_) {
-      const double sigma = scale_sigma();
-      const bool is_stated = std::abs(std::log(stated_scale())) < kSigmas * sigma;
+      const std::vector<double> of_views = scales_of_views();
+      const double sigma = scale_sigma(of_views);
+      const bool is_stated = is_stated_scale(sigma, of_views.size());
       const double metres = 1 / (is_stated ? scene_.world_per_stated_unit : world_scale());
       internal_per_metre = is_stated ? scene_.world_per_stated_unit / frame.scale : scale_->scale;
       scatter = std::max(scatter, scale_->scatter);
@@ -232,6 +244,8 @@ class Fitter {
                    " of what the photographs show";
     }
   }
+
+  static constexpr double kSigmas = 3;
 
   const Scene& scene_;
   const std::vector<ViewPriors>& priors_;

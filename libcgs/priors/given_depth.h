@@ -31,8 +31,8 @@ struct GivenDepth {
 /// offset per view, all found as in depth_fit.h. A kind that is not known is the one that fits:
 /// metric if the files state metres, or metres are scene units, and one scale for all fits within
 /// 5 % and about as well as the others do, else the better of the other two. Metric depth whose
-/// scale is that of the cameras within three sigma says that a scene unit is a metre. What does not
-/// fit is left out with a remark.
+/// scale is that of the cameras within three sigma, that of a single view within 2 % too, says that
+/// a scene unit is a metre. What does not fit is left out with a remark.
 ///
 /// \param priors  of plane_sweep(), in the order of Scene::input
 GivenDepth fit_given_depth(const Scene& scene, const std::vector<ViewPriors>& priors);

@@ -139,6 +139,26 @@ TEST(FitGivenDepth, MetricCamerasStayMetric) {
   EXPECT_GT(given.metres_sigma, 0.004);
 }
 
+// Nothing tells how far a single view errs as a whole; that its pixels scatter excuses no other
+// unit.
+TEST(FitGivenDepth, OfOneNoisyViewIsMetricOnlyNearTheScaleOfTheCameras) {
+  Example e;
+  e.scene.depth_kind = DepthKind::Metric;
+  const auto metres_per_unit = [&](double unit) {
+    DepthMap given(kWidth, kHeight, kNaN);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const double noise = 0.07 * ((x * 7919 + y * 104729) % 97 / 48.0 - 1);
+        given(x, y) = static_cast<float>(unit * Example::truth(x, y) * (1 + noise));
+      }
+    }
+    e.scene.views[0].given_depth = given;
+    return fit_given_depth(e.scene, e.priors).metres_per_unit;
+  };
+  EXPECT_NEAR(metres_per_unit(1.1), 1.1, 0.02);
+  EXPECT_EQ(metres_per_unit(1.005), 1);
+}
+
 // Views err as a whole: of n of them the mean is known to their scatter over the root of n.
 TEST(FitGivenDepth, TheScaleIsAsSureAsTheMeanOfItsViews) {
   Example e;
