@@ -51,7 +51,7 @@ PriorsCoverage coverage(const Raster<DepthOrigin>& before,
 }  // namespace
 
 bool is_measured(const PriorsCoverage& share) {
-  return share.measured + share.guessed >= kLeastMeasured;
+  return share.measured + share.guessed >= share.least_measured;
 }
 
 void PriorsOptions::validate() const {
@@ -116,7 +116,10 @@ class Estimator {
   // A view of which nothing was measured says nothing of the scene: filled in, it would be a
   // surface that nobody saw.
   void forget_unmeasured() {
-    const auto& shares = out_.report.coverage;
+    std::vector<PriorsCoverage>& shares = out_.report.coverage;
+    for (size_t i = 0; i < shares.size(); ++i) {
+      if (!is_measured(shares[i])) shares[i].least_measured = least_measured(scene_, out_.views, i);
+    }
     const bool has_pixels = std::any_of(shares.begin(), shares.end(), [](const auto& share) {
       return share.measured + share.completed + share.guessed + share.no_surface() +
                  share.left_open >
@@ -128,16 +131,9 @@ class Estimator {
           "no depth can be measured: hardly a point of one input view was found in another. They "
           "must overlap and show texture, and their cameras must be right");
     }
-    for (size_t i = 0; i < shares.size(); ++i) {
-      if (is_measured(shares[i])) continue;
-      ViewPriors& priors = out_.views[i];
-      for (DepthOrigin& origin : priors.origin.data) {
-        if (origin != DepthOrigin::Background) origin = DepthOrigin::Unknown;
-      }
-      for (DepthMap* map : {&priors.depth, &priors.sigma}) {
-        std::fill(map->data.begin(), map->data.end(), std::nanf(""));
-      }
-    }
+    std::vector<uint8_t> are_forgotten;
+    for (const PriorsCoverage& share : shares) are_forgotten.push_back(is_measured(share) ? 0 : 1);
+    forget_views(scene_, are_forgotten, out_.views);
   }
 
   const View& view(size_t i) const { return scene_.views[static_cast<size_t>(scene_.input[i])]; }

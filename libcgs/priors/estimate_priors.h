@@ -9,6 +9,7 @@
 #include "libcgs/priors/depth_completion.h"
 #include "libcgs/priors/depth_layers.h"
 #include "libcgs/priors/estimated_depth.h"
+#include "libcgs/priors/forgotten_views.h"
 #include "libcgs/priors/given_depth.h"
 #include "libcgs/priors/plane_sweep.h"
 #include "libcgs/priors/unmeasured.h"
@@ -38,6 +39,7 @@ struct PriorsCoverage {
   double left_open = 0;         ///< Not measured, and not filled in either.
   double estimated = 0;         ///< The part of completed and guessed that is no evidence.
   UnmeasuredShares unmeasured;  ///< Why the rest was not measured; of completed, too.
+  double least_measured = kLeastMeasured;  ///< See least_measured().
 
   /// Measured, or adjoining what is.
   double with_evidence() const { return 1 - no_surface() - estimated - left_open; }
@@ -45,10 +47,7 @@ struct PriorsCoverage {
   double no_surface() const { return sky + transient + background; }
 };
 
-/// Below this share of a view, all that was measured may be false matches.
-inline constexpr double kLeastMeasured = 0.01;
-
-/// Whether anything of a view was measured; if not, its depth stays unknown.
+/// Whether enough of a view was measured to tell anything; if not, its depth stays unknown.
 bool is_measured(const PriorsCoverage& share);
 
 /// What became of depth that came with the photographs.
