@@ -53,6 +53,24 @@ DepthMap gaps(const SupportView& view, const SupportOptions& options) {
   return out;
 }
 
+// How far off a pixel may be by what its view says of it. Sigma tells how well a place was
+// measured; that of filled-in depth is up to half of it, and would let it vouch for all that is
+// drawn.
+float stated_tolerance(const SupportView& view,
+                       size_t pixel,
+                       float depth,
+                       const SupportOptions& options) {
+  constexpr float kMostFilledIn = 25;  // times the tolerance: training moves hardly any farther
+  const float least = options.relative_tolerance * depth;
+  if (view.sigma.empty() || !std::isfinite(view.sigma.data[pixel])) return least;
+  const float stated = std::max(least, options.sigma_factor * view.sigma.data[pixel]);
+  const DepthEvidence evidence =
+      view.evidence.empty() ? DepthEvidence::Measured : view.evidence.data[pixel];
+  const bool is_filled_in =
+      evidence == DepthEvidence::Adjoining || evidence == DepthEvidence::Estimated;
+  return is_filled_in ? std::min(stated, kMostFilledIn * least) : stated;
+}
+
 Witness make_witness(const SupportView& view, const Camera& camera, const SupportOptions& options) {
   SurfaceLinks anew;
   if (view.links.empty()) anew = surface_links(view.depth, gaps(view, options));
@@ -67,10 +85,7 @@ Witness make_witness(const SupportView& view, const Camera& camera, const Suppor
       if (surface.pixel(x, y) < 0) continue;
       const auto pixel = static_cast<size_t>(surface.pixel(x, y));
       if (!view.evidence.empty()) out.evidence(x, y) = view.evidence.data[pixel];
-      float tolerance = options.relative_tolerance * surface.depth(x, y);
-      if (!view.sigma.empty() && std::isfinite(view.sigma.data[pixel])) {
-        tolerance = std::max(tolerance, options.sigma_factor * view.sigma.data[pixel]);
-      }
+      const float tolerance = stated_tolerance(view, pixel, surface.depth(x, y), options);
       // A drawn pixel carries the depth of a Gaussian centred up to a pixel away.
       out.tolerance(x, y) = tolerance + 1.5f * change_over_pixel(surface.depth, x, y, options);
     }
@@ -113,6 +128,10 @@ struct Judge {
       if (!(off <= witness.tolerance(x, y))) continue;  // also if unknown
       const DepthEvidence evidence =
           witness.evidence.empty() ? DepthEvidence::Measured : witness.evidence(x, y);
+      // Its depth is no more than "far": what is drawn well before it is something else.
+      const bool is_nearer_than_sky =
+          evidence == DepthEvidence::Sky && z < 0.5f * witness.depth(x, y);
+      if (is_nearer_than_sky) continue;
       ++views.at(static_cast<size_t>(evidence));
     }
     const auto [measured, adjoining, estimated, sky] = views;

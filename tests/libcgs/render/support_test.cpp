@@ -286,6 +286,35 @@ TEST(AnnotateSupport, WhatAnEstimateOrSkyShowsHasNoSupportAndIsNoHole) {
   }
 }
 
+// Its sigma is half of its depth, as that of depth filled in far from anything measured.
+TEST(AnnotateSupport, UncertainDepthThatWasFilledInVouchesForWhatIsDrawnNearIt) {
+  const auto judged = [](float drawn, DepthEvidence evidence) {
+    Facing facing(drawn, 1);
+    facing.view.sigma = DepthMap(facing.camera.width, facing.camera.height, 0.5f);
+    facing.view.evidence = everywhere(facing.camera, evidence);
+    annotate_support(facing.buffers, facing.camera, std::span(&facing.view, 1));
+    return facing.buffers.hole(9, 7);
+  };
+  for (const auto& [evidence, shown] : {std::pair(DepthEvidence::Estimated, Hole::Estimated),
+                                        {DepthEvidence::Adjoining, Hole::None}}) {
+    EXPECT_EQ(judged(0.8f, evidence), shown);
+    EXPECT_EQ(judged(1.2f, evidence), shown);
+    EXPECT_EQ(judged(0.7f, evidence), Hole::Occluded);
+    EXPECT_EQ(judged(1.3f, evidence), Hole::Occluded);
+  }
+  EXPECT_EQ(judged(0.7f, DepthEvidence::Measured), Hole::None) << "a measurement says what it says";
+}
+
+TEST(AnnotateSupport, SkyVouchesForNothingNearerThanHalfItsBackdrop) {
+  for (const auto& [drawn, hole] :
+       {std::pair(0.6f, Hole::Sky), {1.6f, Hole::Sky}, {0.4f, Hole::Occluded}}) {
+    Facing facing(drawn, 1);
+    facing.view.sigma = DepthMap(facing.camera.width, facing.camera.height, 0.5f);
+    facing.view.evidence = everywhere(facing.camera, DepthEvidence::Sky);
+    EXPECT_EQ(facing.judged(), hole) << drawn;
+  }
+}
+
 TEST(AnnotateSupport, AnEstimateAddsNothingToWhatOthersMeasured) {
   Facing facing(1, 1);
   std::vector<SupportView> views(3, facing.view);
