@@ -96,9 +96,12 @@ using Corner = Eigen::Vector3d;
 
 class Canvas {
  public:
-  explicit Canvas(const Camera& camera)
+  // \param largest  side of a cell [pixels]: one larger shows that the camera is almost inside the
+  //                 surface, where depth says nothing
+  Canvas(const Camera& camera, double largest)
       : inverse_depth_(camera.width, camera.height, kNan),
-        pixel_(camera.width, camera.height, -1) {}
+        pixel_(camera.width, camera.height, -1),
+        largest_(largest) {}
 
   // Twice the area, positive where the other camera sees the side that the view saw.
   static double area(const Corner& a, const Corner& b, const Corner& c) {
@@ -152,9 +155,7 @@ class Canvas {
     const Eigen::Vector2d ab = (b - a).head<2>();
     const Eigen::Vector2d ac = (c - a).head<2>();
     const double area = Canvas::area(a, b, c);
-    // A cell so large shows that the camera is almost inside the surface, where depth says nothing.
-    constexpr double kLargest = 64;
-    if (!(std::abs(area) > 1e-12) || x1 - x0 > kLargest || y1 - y0 > kLargest) return;
+    if (!(std::abs(area) > 1e-12) || x1 - x0 > largest_ || y1 - y0 > largest_) return;
     for (int y = static_cast<int>(y0); y <= static_cast<int>(y1); ++y) {
       for (int x = static_cast<int>(x0); x <= static_cast<int>(x1); ++x) {
         const Eigen::Vector2d p(x + 0.5 - a.x(), y + 0.5 - a.y());
@@ -171,6 +172,7 @@ class Canvas {
 
   DepthMap inverse_depth_;
   Raster<int32_t> pixel_;
+  double largest_;
 };
 
 }  // namespace
@@ -192,7 +194,9 @@ SeenSurface seen_surface(const DepthCells& cells, const Camera& camera) {
   constexpr std::array<PixelStep, 4> kCorners = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};
   const Surface surface(cells);
   const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
-  Canvas canvas(camera);
+  // A longer lens enlarges cells without coming nearer.
+  constexpr double kNearest = 64;
+  Canvas canvas(camera, kNearest * std::max(1.0, camera.fx / cells.camera.fx));
   std::vector<std::array<Corner, 3>> backs;
   for (int y = 0; y < cells.depth.height; ++y) {
     for (int x = 0; x < cells.depth.width; ++x) {

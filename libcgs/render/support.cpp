@@ -25,11 +25,20 @@ float change_along(const DepthMap& depth, int x, int y, int dx, int dy) {
   return std::isnan(step) ? 0 : step;
 }
 
-// Change of depth over a pixel of a slanted surface; bounded, so that things one pixel wide, which
-// have jumps on both sides, do not agree with everything.
-float change_over_pixel(const DepthMap& depth, int x, int y, const SupportOptions& options) {
+// How many pixels of a picture a pixel of a view is wide, by their focal lengths; one at least.
+int magnification(const Camera& picture, const Camera& view) {
+  constexpr double kMost = 1000;  // beyond, a single pixel is all there is
+  return static_cast<int>(std::lround(std::clamp(picture.fx / view.fx, 1.0, kMost)));
+}
+
+// Change of depth over a pixel of the view of a slanted surface; bounded, so that things one pixel
+// wide, which have jumps on both sides, do not agree with everything.
+// \param wide  magnification() of the view
+float change_over_pixel(
+    const DepthMap& depth, int x, int y, int wide, const SupportOptions& options) {
   constexpr float kLargest = 5;  // times the tolerance: a surface almost seen edge-on
-  const float change = change_along(depth, x, y, 1, 0) + change_along(depth, x, y, 0, 1);
+  const float change = static_cast<float>(wide) *
+                       (change_along(depth, x, y, 1, 0) + change_along(depth, x, y, 0, 1));
   return std::min(change, kLargest * options.relative_tolerance * depth(x, y));
 }
 
@@ -76,6 +85,7 @@ Witness make_witness(const SupportView& view, const Camera& camera, const Suppor
   if (view.links.empty()) anew = surface_links(view.depth, gaps(view, options));
   const SurfaceLinks& links = view.links.empty() ? anew : view.links;
   const SeenSurface surface = seen_surface({view.camera, view.depth, links}, camera);
+  const int wide = magnification(camera, view.camera);
   Witness out{surface.depth, surface.depth, {}};
   if (!view.evidence.empty()) {
     out.evidence = EvidenceMap(camera.width, camera.height, DepthEvidence::Measured);
@@ -87,7 +97,8 @@ Witness make_witness(const SupportView& view, const Camera& camera, const Suppor
       if (!view.evidence.empty()) out.evidence(x, y) = view.evidence.data[pixel];
       const float tolerance = stated_tolerance(view, pixel, surface.depth(x, y), options);
       // A drawn pixel carries the depth of a Gaussian centred up to a pixel away.
-      out.tolerance(x, y) = tolerance + 1.5f * change_over_pixel(surface.depth, x, y, options);
+      out.tolerance(x, y) =
+          tolerance + 1.5f * change_over_pixel(surface.depth, x, y, wide, options);
     }
   }
   return out;
@@ -109,6 +120,7 @@ struct Judge {
   const RenderBuffers& buffers;
   const std::vector<Witness>& witnesses;
   const SupportOptions& options;
+  int step = 1;  // pixels: magnification() of the view that shows the most
 
   // NaN where no surface is drawn.
   float surface(int x, int y) const {
@@ -147,8 +159,8 @@ struct Judge {
     if (at_own_depth.is_shown()) return at_own_depth;
     bool shown_beside = false;
     Verdict best;
-    for (int v = y - kRim; v <= y + kRim; ++v) {
-      for (int u = x - kRim; u <= x + kRim; ++u) {
+    for (int v = y - kRim * step; v <= y + kRim * step; v += step) {
+      for (int u = x - kRim * step; u <= x + kRim * step; u += step) {
         shown_beside = shown_beside || of(u, v, z).is_shown();
         const float beside = surface(u, v);
         if (std::isnan(beside)) continue;
@@ -162,8 +174,15 @@ struct Judge {
   }
 
  private:
-  static constexpr int kRim = 3;  // [pixels]
+  static constexpr int kRim = 3;  // [steps]: Gaussians, and their rims, grow with the picture
 };
+
+// Of the view whose pixels are finest: what is not sure of all of them is not said.
+int finest_magnification(const Camera& picture, std::span<const SupportView> views) {
+  int out = views.empty() ? 1 : magnification(picture, views.front().camera);
+  for (const SupportView& view : views) out = std::min(out, magnification(picture, view.camera));
+  return out;
+}
 
 // The picture of an input view; its pose is inverted once, not at each pixel.
 struct InputPicture {
@@ -282,7 +301,7 @@ void annotate_support(RenderBuffers& buffers,
   });
   buffers.support = Raster<uint8_t>(camera.width, camera.height, 0);
   buffers.hole = Raster<Hole>(camera.width, camera.height, Hole::None);
-  const Judge judge{buffers, witnesses, options};
+  const Judge judge{buffers, witnesses, options, finest_magnification(camera, views)};
   const std::vector<InputPicture> pictures = pictures_of(views);
   tbb::parallel_for(0, camera.height, [&](int y) {
     for (int x = 0; x < camera.width; ++x) {

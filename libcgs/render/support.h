@@ -42,14 +42,15 @@ void link_pixels(SupportView& view, const SupportOptions& options = {});
 /// The surface of a pixel is its median depth (its mean depth where that is unknown). An input view
 /// supports the pixel if the surface that the view saw (seen_surface()) lands on the centre of that
 /// very pixel, nearest first, at the same depth: within max(relative_tolerance * depth,
-/// sigma_factor * sigma), plus what a slanted surface changes over 1.5 pixels. Of depth that was
-/// filled in, this is at most 25 * relative_tolerance * depth: its sigma says that it may be
-/// anywhere, not that anything drawn is right. What is drawn nearer than half of the backdrop is no
-/// sky. What the view hides or never had in its picture lands nowhere.
+/// sigma_factor * sigma), plus what a slanted surface changes over 1.5 pixels of the view. Of depth
+/// that was filled in, this is at most 25 * relative_tolerance * depth: its sigma says that it may
+/// be anywhere, not that anything drawn is right. What is drawn nearer than half of the backdrop is
+/// no sky. What the view hides or never had in its picture lands nowhere.
 ///
 /// Blended Gaussians have soft rims, so that a pixel beside a silhouette may show what is not quite
 /// there. Where no view agrees at the very pixel but one does within three pixels, the pixel is
-/// therefore judged by the best of the depths drawn within three pixels.
+/// therefore judged by the best of the depths drawn within three pixels. In pictures that show more
+/// than the views do, by the focal lengths, these are pixels of the view that shows the most.
 ///
 /// Views of which the depth is Measured count one each, those of which it is Adjoining one
 /// together. A pixel that views show with no more than an estimate, or as sky, has support 0 and is

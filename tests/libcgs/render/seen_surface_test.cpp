@@ -157,6 +157,19 @@ TEST(SeenSurface, EndsWhereTheCameraAllButTouchesIt) {
   for (const int32_t pixel : surface.pixel.data) ASSERT_EQ(pixel, -1);
 }
 
+// However long the lens that looks at it is.
+TEST(SeenSurface, StaysClosedThroughALongLens) {
+  const Camera camera = camera_at({0, 0, 0});
+  Camera narrow = camera;
+  narrow.fx *= 150;
+  narrow.fy *= 150;
+  const SeenSurface surface = seen(camera, DepthMap(80, 60, 1), narrow);
+  for (size_t i = 0; i < surface.pixel.data.size(); ++i) {
+    ASSERT_GE(surface.pixel.data[i], 0) << i;
+    ASSERT_NEAR(surface.depth.data[i], 1, 1e-5) << i;
+  }
+}
+
 TEST(SeenSurface, LeavesOutWhatLiesBehindTheCamera) {
   const Camera camera = camera_at({0, 0, 0});
   const SeenSurface surface = seen(camera, DepthMap(80, 60, 1), camera_at({0, 0, 2}));

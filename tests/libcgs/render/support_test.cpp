@@ -162,6 +162,11 @@ TEST(AnnotateSupport, InventsNoHolesWhereEverythingWasSeen) {
   }
 }
 
+// Gaussians, their rims and what a slanted surface changes over one of them grow with the picture.
+TEST(AnnotateSupport, InventsHardlyAHoleInALargerPictureOfAnInputView) {
+  EXPECT_LE(score_holes(three_in_a_row(), resized(camera_at({0, 0, 0}), 1008, 756)).invented, 20U);
+}
+
 TEST(AnnotateSupport, CountsTheViewsThatSeeTheSurface) {
   const WallAndBox scene;
   const auto [views, g] = inputs_of(scene, three_in_a_row());
