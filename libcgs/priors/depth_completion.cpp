@@ -50,12 +50,6 @@ class EmptySpace {
     });
   }
 
-  bool is_before_sky(int x, int y, float inverse_depth) const {
-    return is_all_around(x, y, inverse_depth, [&](int i, int j, float) {
-      return witness_.priors->origin(i, j) == DepthOrigin::Sky;
-    });
-  }
-
  private:
   static constexpr float kMargin = 0.03f;  // of the depth
   static constexpr float kSigmas = 3;
@@ -123,15 +117,13 @@ class Completion {
     });
   }
 
-  // Gives up what is before the sky of a witness at any depth, wherever smoothing brought it.
-  void clear_sky() {
+  // Takes out of the way of witnesses what smoothing brought there.
+  void clear_sights() {
     tbb::parallel_for(0, filled_.height, [&](int y) {
       for (int x = 0; x < filled_.width; ++x) {
         if (!usable(x, y) || measured(x, y)) continue;
         float& rho = filled_(x, y).inverse_depth;
-        if (!before_sky(x, y, rho)) continue;
         rho = behind_empty(x, y, rho);
-        if (before_sky(x, y, rho)) rho = kNaN;
       }
     });
   }
@@ -182,13 +174,8 @@ class Completion {
     });
   }
 
-  bool before_sky(int x, int y, float inverse_depth) const {
-    return std::any_of(empty_.begin(), empty_.end(), [&](const EmptySpace& space) {
-      return space.is_before_sky(x, y, inverse_depth);
-    });
-  }
-
-  // The nearest place that no witness sees past, from the given one backwards.
+  // The nearest place that no witness sees past, from the given one backwards to nearly three times
+  // its depth; NaN where there is none.
   float behind_empty(int x, int y, float inverse_depth) const {
     constexpr float kStep = 0.98f;
     constexpr int kSteps = 50;
@@ -196,7 +183,7 @@ class Completion {
     for (int k = 0; k < kSteps; ++k, rho *= kStep) {
       if (!empty(x, y, rho)) return rho;
     }
-    return inverse_depth;
+    return kNaN;
   }
 
   Filled estimate(int x, int y, float fallback) const {
@@ -254,7 +241,8 @@ class Completion {
       const int v = y + d.dy;
       if (!filled_.contains(u, v) || !usable(u, v)) continue;
       const float there = filled_(u, v).inverse_depth;
-      if (std::abs(there - here.inverse_depth) > step * here.inverse_depth) continue;
+      const float change_of_depth = std::abs(there - here.inverse_depth);
+      if (!(change_of_depth <= step * here.inverse_depth)) continue;  // also if unknown
       const float change = color_change(x, y, u, v) / options_.level_scale;
       const float w = 1 / (1 + change * change);
       sum += w * there;
@@ -306,7 +294,7 @@ void complete_depth(ViewPriors& priors,
   Completion completion(priors, view, options, witnesses);
   completion.collect(fallback_inverse_depth(priors, options), part_of(progress, 0, 0.5));
   completion.smooth(part_of(progress, 0.5, 1));
-  completion.clear_sky();
+  completion.clear_sights();
   constexpr float kFloor = 0.02f;  // relative sigma next to the evidence
   constexpr float kCap = 0.5f;
   for (int y = 0; y < priors.depth.height; ++y) {

@@ -29,17 +29,18 @@ struct CompletionWitness {
   const ViewPriors* priors = nullptr;  ///< Likewise. Only measured pixels and sky speak.
 };
 
-/// Gives every valid pixel a finite depth, but not sky, nor what would hide the sky of a witness at
-/// any depth. Measured pixels are left as they are; the others get origin Completed, a large sigma
-/// and keep their confidence.
+/// Gives every valid pixel a finite depth, but not sky, nor what would stand in the way of a
+/// witness at any depth. Measured pixels are left as they are; the others get origin Completed, a
+/// large sigma and keep their confidence.
 ///
 /// Works in inverse depth. From a pixel without depth, rays in 16 directions collect the first
 /// measured pixel each, weighted down by the way and by the colour changes along it. Of those the
 /// value at `background_share` is taken: what one view alone shows is mostly what nearer surfaces
 /// hide from the others, so it belongs to the farther one. Evidence that would put the pixel where
 /// a witness looks through does not count; if none is left, the pixel moves back until no witness
-/// objects. Then the values are smoothed towards neighbours on the same surface, which turns steps
-/// on slanted surfaces into slopes; what is then before the sky of a witness moves back once more.
+/// objects, up to nearly three times as far; beyond, it stays open. Then the values are smoothed
+/// towards neighbours on the same surface, which turns steps on slanted surfaces into slopes; what
+/// a witness then objects to moves back once more.
 ///
 /// \throws NumericalError if nothing is measured and there is no fallback
 void complete_depth(ViewPriors& priors,

@@ -159,6 +159,42 @@ TEST(CompleteDepth, MovesBackWhereOtherViewsLeaveNoEvidence) {
   EXPECT_NEAR(e.priors.depth(30, 10), 4, 0.05 * 4);
 }
 
+TEST(CompleteDepth, LeavesOpenWhatWouldStandFarBeforeWhatAnotherViewMeasured) {
+  Example e(60, 20);
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 25; ++x) e.measure(x, y, 2);
+  }
+  Example witness(60, 20);
+  witness.view.camera.world_from_cam.translation().x() = -0.2;
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 60; ++x) witness.measure(x, y, 40);
+  }
+  complete_depth(e.priors, e.view, {}, {{&witness.view.camera, &witness.priors}});
+  for (int x = 25; x < 50; ++x) {
+    EXPECT_EQ(e.priors.origin(x, 10), DepthOrigin::Unknown) << x;
+    EXPECT_TRUE(std::isnan(e.priors.depth(x, 10))) << x;
+  }
+}
+
+// Smoothing leads from where they moved back to towards what is measured beside them.
+TEST(CompleteDepth, LeavesNothingInTheWayOfAnotherViewAfterSmoothing) {
+  Example e(60, 20);
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 60; ++x) {
+      if (x < 25) e.measure(x, y, 2);
+      if (x >= 35) e.measure(x, y, 2.08f);
+    }
+  }
+  Example witness(60, 20);
+  witness.view.camera.world_from_cam.translation().x() = -0.2;
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 60; ++x) witness.measure(x, y, 2.2f);
+  }
+  complete_depth(e.priors, e.view, {}, {{&witness.view.camera, &witness.priors}});
+  const float in_the_way = 0.97f * 2.2f;
+  for (int x = 25; x < 35; ++x) EXPECT_GE(e.priors.depth(x, 10), in_the_way - 1e-4f) << x;
+}
+
 // Between surfaces at 2 and 5 of one colour lies sky.
 TEST(CompleteDepth, LooksForEvidenceOnThisSideOfTheSky) {
   Example e(60, 20);
