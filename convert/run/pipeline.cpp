@@ -69,10 +69,14 @@ bool is_done(const Run& run, const StageFiles& stage) {
 Json result_of(const Run& run, Stage stage) { return run.record.result(traits(stage).name); }
 
 // What photographs may be kept in [bytes]: some of what no stage needs.
-size_t spare_memory(const std::vector<StageMemory>& plan, size_t budget) {
+size_t most_memory(const std::vector<StageMemory>& plan) {
   size_t most = 0;
   for (const StageMemory& stage : plan) most = std::max(most, stage.bytes);
-  return std::min(kKeptPhotographs, budget - std::min(budget, most));
+  return most;
+}
+
+size_t spare_memory(const std::vector<StageMemory>& plan, size_t budget) {
+  return std::min(kKeptPhotographs, budget - std::min(budget, most_memory(plan)));
 }
 
 Json memory_to_json(const std::vector<StageMemory>& plan) {
@@ -383,7 +387,7 @@ FinishedRun run_pipeline(const RunRequest& request,
   const size_t budget = memory_budget(request.memory_limit);
   check_memory_plan(scene, work, budget);
   scene.cache = std::make_shared<PhotographCache>(spare_memory(plan, budget));
-  refuse_unreadable(scene, budget, terminal.begin("reading photographs"));
+  refuse_unreadable(scene, most_memory(plan), terminal.begin("reading photographs"));
   (void)terminal.end("");
   const size_t known = scene.warnings.size();
   const Json fit = camera_fit_to_json(check_stated_cameras(opened, terminal));

@@ -20,8 +20,8 @@ namespace cgs {
 
 namespace {
 
-// How many photographs may be decoded at once within a half of the memory.
-size_t read_at_once(const Scene& scene, size_t budget) {
+// How many photographs may be decoded at once.
+size_t read_at_once(const Scene& scene, size_t room) {
   constexpr double kOfPixel = 32;  // [bytes]; as of_reading() in the memory plan, and a mask
   double largest = 1;
   for (const View& view : scene.views) {
@@ -36,7 +36,7 @@ size_t read_at_once(const Scene& scene, size_t budget) {
   const double threads =
       double(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   return static_cast<size_t>(
-      std::clamp(double(budget) / 2 / (kOfPixel * largest), 1.0, std::max(1.0, threads)));
+      std::clamp(double(room) / (kOfPixel * largest), 1.0, std::max(1.0, threads)));
 }
 
 // In the order in which damage is told.
@@ -65,9 +65,9 @@ std::vector<std::function<void()>> reads_of(const Scene& scene) {
 
 }  // namespace
 
-void refuse_unreadable(const Scene& scene, size_t budget, const Progress& progress) {
+void refuse_unreadable(const Scene& scene, size_t room, const Progress& progress) {
   const std::vector<std::function<void()>> reads = reads_of(scene);
-  const size_t at_once = read_at_once(scene, budget);
+  const size_t at_once = read_at_once(scene, room);
   for (size_t from = 0; from < reads.size(); from += at_once) {
     report(progress, double(from) / double(reads.size()));
     std::vector<std::exception_ptr> failures(std::min(at_once, reads.size() - from));

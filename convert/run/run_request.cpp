@@ -29,29 +29,6 @@ PictureWork picture_work(const RunRequest& request) {
 
 namespace {
 
-bool is_utf8(const std::string& text) {
-  try {
-    (void)nlohmann::json(text).dump();
-  } catch (const nlohmann::json::exception&) {
-    return false;
-  }
-  return true;
-}
-
-// JSON holds no other bytes: what was asked for could not be read back, to resume or to verify it.
-void refuse_paths_of_other_bytes(const SceneRequest& request) {
-  for (const std::filesystem::path* const path : {&request.path,
-                                                  &request.options.depth.folder,
-                                                  &request.options.depth.network,
-                                                  &request.control.file}) {
-    std::error_code ignored;  // as it was typed, then
-    const std::filesystem::path whole = std::filesystem::weakly_canonical(*path, ignored);
-    if (is_utf8(path->string()) && is_utf8(whole.string())) continue;
-    throw InvalidInput("the path " + printable(ignored ? *path : whole) +
-                       " is not in UTF-8, in which run.json records it; rename its folder or file");
-  }
-}
-
 // Lengths that will be refused, before minutes are spent on cameras.
 void check_lengths_of_photographs(const RunRequest& request) {
   if (!is_photographs(request.scene.path)) return;
@@ -69,7 +46,6 @@ void check_lengths_of_photographs(const RunRequest& request) {
 }  // namespace
 
 OpenedScene open_scene_of(const RunRequest& request, Terminal& terminal) {
-  refuse_paths_of_other_bytes(request.scene);
   check_lengths_of_photographs(request);
   const std::filesystem::path model = request.output / "model";
   std::optional<NewFolder> folder;

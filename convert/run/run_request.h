@@ -45,8 +45,7 @@ PictureWork picture_work(const RunRequest& request);
 
 /// Opens the scene of a run. Cameras that took minutes are stored at once, so that what is refused
 /// later costs them no second time; not where a run is, which has cameras of its own.
-/// \throws InvalidInput for a path that run.json cannot hold, as it is not in UTF-8; IoError before
-///         cameras are solved for where they could not be stored; as open_scene()
+/// \throws IoError before cameras are solved for where they could not be stored; as open_scene()
 OpenedScene open_scene_of(const RunRequest& request, Terminal& terminal);
 
 /// Refuses promises that contradict other settings.

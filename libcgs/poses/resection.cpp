@@ -152,11 +152,11 @@ bool resect(Reconstruction& scene, int photo) {
 double least_angle(const std::vector<LensPrior>& priors) {
   constexpr double kLeast = 0.01;
   constexpr double kPixels = 12.5;
-  double out = kLeast;
+  double out = 0;
   for (const LensPrior& prior : priors) {
-    if (prior.focal > 0) out = std::min(out, kPixels / prior.focal);
+    out = std::max(out, prior.focal > 0 ? kPixels / prior.focal : kLeast);
   }
-  return out;
+  return std::min(out, kLeast);
 }
 
 int points_in(const Reconstruction& scene, int photo) {

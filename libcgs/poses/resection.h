@@ -14,9 +14,9 @@ inline constexpr double kMostError = 4;
 inline constexpr double kLeastParallax = 1.5;  ///< Median, of pairs to begin with.
 
 /// Least angle [rad] between two rays that tell where a point is: 0.01, as 12.5 working pixels are
-/// through the lens of a phone; through longer lenses as many pixels, where their focal length is
-/// known beforehand. (Any focal length may be tried where it is not: the smaller the angle, the
-/// more points a wrong one explains.)
+/// through the lens of a phone; as many pixels where all lenses are known beforehand to be longer.
+/// (Any focal length may be tried where it is not known: the smaller the angle, the more points a
+/// wrong one explains.)
 double least_angle(const std::vector<LensPrior>& priors);
 
 /// The photographs a reconstruction began with, as BundleOptions wants them.

@@ -245,20 +245,24 @@ class Transients {
   }
 
   // Whether something at a place before that depth is what the pixel shows: two others show it
-  // alike, or the only one that has the place in its picture does.
+  // alike, or the only one that has the place in its picture does, and more so: of some hundred
+  // places one may look alike by chance.
   bool is_explained(size_t i, int x, int y, float depth) const {
     const int tried = places_before(i, x, y, double{depth});
     for (int k = 0; k < tried; ++k) {
       const double share = 1 + (1 / kNearest - 1) * k / (tried - 1);
       int shown = 0;
       int framed = 0;
+      float last = 0;
       for (const size_t j : others_[i]) {
-        const auto alike = is_alike(views_[i], x, y, double{depth} / share, views_[j]);
-        framed += alike ? 1 : 0;
-        shown += alike.value_or(false) ? 1 : 0;
+        const auto off = unlikeness(views_[i], x, y, double{depth} / share, views_[j]);
+        if (!off) continue;
+        ++framed;
+        last = *off;
+        shown += *off < kSameColor ? 1 : 0;
         if (shown == 2) return true;
       }
-      if (shown == 1 && framed == 1) return true;
+      if (framed == 1 && last < 0.5F * kSameColor) return true;
     }
     return false;
   }
@@ -282,8 +286,8 @@ class Transients {
     return static_cast<int>(std::clamp(longest / kStep, kFewest, kMost));
   }
 
-  // Nothing where the other has none of the place in its picture.
-  static std::optional<bool> is_alike(
+  // Mean difference around the pixel; nothing where the other has none of the place in its picture.
+  static std::optional<float> unlikeness(
       const SmallView& view, int x, int y, double depth, const SmallView& other) {
     constexpr int kRadius = 2;
     const Eigen::Vector3d uvz =
@@ -301,7 +305,7 @@ class Transients {
       }
     }
     if (count == 0) return std::nullopt;
-    return sum < kSameColor * static_cast<float>(count);
+    return sum / static_cast<float>(count);
   }
 
   static MaskMap at_full_size(const MaskMap& small, int factor, int width, int height) {

@@ -177,7 +177,7 @@ struct Judge {
   static constexpr int kRim = 3;  // [steps]: Gaussians, and their rims, grow with the picture
 };
 
-// Of the view whose pixels are finest: what is not sure of all of them is not said.
+// Of the view whose pixels are finest: no rim is then taken to be wider than it is.
 int finest_magnification(const Camera& picture, std::span<const SupportView> views) {
   int out = views.empty() ? 1 : magnification(picture, views.front().camera);
   for (const SupportView& view : views) out = std::min(out, magnification(picture, view.camera));

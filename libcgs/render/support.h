@@ -25,7 +25,7 @@ struct SupportView {
 /// When an input view counts as having seen a rendered pixel.
 struct SupportOptions {
   float min_alpha = 0.5f;            ///< Pixels less opaque than this show no surface; in (0, 1].
-  float sigma_factor = 3;            ///< Depths agree within this many standard deviations; >= 0.
+  float sigma_factor = 3;            ///< Measured depths agree within this many sigmas; >= 0.
   float relative_tolerance = 0.01f;  ///< They always agree within this part of the depth; > 0.
 
   /// \throws InvalidInput naming the first field out of range.

@@ -35,6 +35,7 @@ Json report_of(size_t shared_places) {
                       {"volume_sigma", 0.05},
                       {"center", {500'012.3456, 5'800'023.4567, 103.9876}}};
   Json gained = none;
+  gained["area"] = 2.5;
   gained["detection"] = 0.02;
   gained["patches"].push_back(patch);
   return {{"earlier", "out/2024"},

@@ -21,12 +21,12 @@ TEST(RefuseUnreadable, TellsTheFirstDamagedPhotographHoweverManyAreReadAtOnce) {
   Scene scene = test::model_of_greys(dir, 5).scene;
   scene.input = {0, 2};
   scene.held_out = {4};
-  for (const size_t budget : {kMuch, kLittle}) {
-    EXPECT_NO_THROW(refuse_unreadable(scene, budget, {}));
+  for (const size_t room : {kMuch, kLittle}) {
+    EXPECT_NO_THROW(refuse_unreadable(scene, room, {}));
   }
   for (const char* name : {"3.png", "1.png"}) test::write_bytes(dir / name, "no picture");
-  for (const size_t budget : {kMuch, kLittle}) {
-    const std::string told = test::message_of([&] { refuse_unreadable(scene, budget, {}); });
+  for (const size_t room : {kMuch, kLittle}) {
+    const std::string told = test::message_of([&] { refuse_unreadable(scene, room, {}); });
     EXPECT_NE(told.find("1.png"), std::string::npos) << told;
   }
 }

@@ -45,14 +45,6 @@ TEST_F(RequestJson, TellsHowFarAwayIsLooked) {
   EXPECT_NE(json()["cameras"], bounded["cameras"]);
 }
 
-TEST_F(RequestJson, NeedsPathsThatItCanHold) {
-  Terminal terminal(true);
-  request_.scene.path = dir_ / "caf\xe9";
-  EXPECT_THROW(open_scene_of(request_, terminal), InvalidInput);
-  request_.scene.path = dir_ / "caf\xc3\xa9";
-  EXPECT_THROW(open_scene_of(request_, terminal), BadInput) << "there is none";
-}
-
 TEST_F(RequestJson, LengthsWaitForWhatDepthFilesTell) {
   request_.max_error = "2mm";
   EXPECT_THROW(check_lengths(request_, scene_), InvalidInput);

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "convert/scene/scene_request.h"
 #include "io/images/image.h"
@@ -14,6 +15,7 @@
 #include "libcgs/core/error.h"
 #include "samples/capture/render.h"
 #include "samples/capture/truth.h"
+#include "tests/support/exif_segment.h"
 #include "tests/support/portal_capture.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
@@ -144,6 +146,43 @@ TEST(PhotoPoses, OfEachScanHaveALensOfItsOwn) {
     const double found = poses.model.cameras.at(image.camera_id).camera.fx;
     EXPECT_NEAR(found / truth.at(image.name), 1, 0.03) << image.name;
   }
+}
+
+// As phones store them: the sensor lies as it does, and Exif says how the phone was held.
+TEST(PhotoPoses, OfUprightAndLyingPhotographsShareALens) {
+  const test::TempDir dir;
+  const std::array<int, 3> orientations = {1, 6, 3};
+  const std::array<double, 3> degrees = {0, -90, 180};  // of the upright picture's axes
+  const Eigen::Vector2d off(9, -6);                     // of the principal point on the sensor
+  size_t count = 0;
+  Camera sensor;
+  for (const CaptureView& view : capture_views()) {
+    if (!view.input) continue;
+    sensor = view.camera;
+    sensor.cx += off.x();
+    sensor.cy += off.y();
+    const fs::path file = dir / "photos" / (view.name + ".jpg");
+    photograph(dir / "drawn.png", sensor, uint32_t(count));
+    fs::create_directories(file.parent_path());
+    cv::imwrite(file, cv::imread(dir / "drawn.png"), {cv::IMWRITE_JPEG_QUALITY, 97});
+    std::string jpeg = test::read_bytes(file);
+    jpeg.insert(2, test::orientation_segment(orientations.at(count)));
+    test::write_bytes(file, jpeg);
+    ++count;
+  }
+  const PhotoPoses poses = solved(dir / "photos", sensor.fx);
+  ASSERT_EQ(poses.model.images.size(), 3u);
+  ASSERT_EQ(poses.model.cameras.size(), 3u);  // COLMAP has no turned ones
+  std::vector<Eigen::Vector2d> centres;
+  for (size_t i = 0; i < 3; ++i) {
+    const Camera& camera = poses.model.cameras.at(poses.model.images[i].camera_id).camera;
+    const bool is_upright = orientations.at(i) == 6;
+    EXPECT_EQ(camera.width, is_upright ? sensor.height : sensor.width);
+    const Eigen::Vector2d at(camera.cx - 0.5 * camera.width, camera.cy - 0.5 * camera.height);
+    centres.push_back(Eigen::Rotation2Dd(degrees.at(i) * M_PI / 180) * at);
+    EXPECT_LT((centres[i] - centres[0]).norm(), 1e-6) << i;
+  }
+  EXPECT_LT((centres[0] - off).norm(), 5) << centres[0].transpose();
 }
 
 TEST(PhotoPoses, AreRefusedForACameraThatWasOnlyTurned) {
