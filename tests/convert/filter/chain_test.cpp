@@ -47,6 +47,7 @@ struct Case {
 
 constexpr const char* kSecond = "second.ply";
 constexpr const char* kSolid = "solid.ply";
+constexpr const char* kBeside = "beside.ply";
 
 // The internal unit of the frame is 64 cm and file coordinates start near (0.5, -0.25, 0).
 const std::map<std::string, Case>& cases() {
@@ -90,7 +91,7 @@ const std::map<std::string, Case>& cases() {
       {"base", {"5cm", Keeps::Area, true, false, 1, true}},
       {"union", {kSolid, Keeps::Part, true, false, 1, true}},  // adds observed area
       {"intersect", {kSolid, Keeps::Part, true, false, 1, true}},
-      {"subtract", {kSolid, Keeps::Part, true, false, 1, true}}};
+      {"subtract", {kBeside, Keeps::Part, true, false, 1, true}}};
   return kCases;
 }
 
@@ -107,7 +108,7 @@ double least_observed(const std::string& name) {
                                                         {"wrap", 0.3},
                                                         {"union", 0.9},
                                                         {"intersect", 0.9},
-                                                        {"subtract", 0}};  // inside the other
+                                                        {"subtract", 0.8}};  // 0.1 the other's
   return kShares.at(name);
 }
 
@@ -140,13 +141,16 @@ void write_inputs(const test::TempDir& dir) {
   FilterState solid = labelled_mesh(true);  // its observed part lies above that of the first
   for (auto& p : solid.mesh.vertices) p.z() += 0.3f;
   write_mesh_ply(dir / kSolid, solid.mesh, solid.frame);
+  // Leaves most of what was observed of the first; its own evidence lies above the equator of that.
+  FilterState beside = labelled_mesh(true);
+  for (auto& p : beside.mesh.vertices) p += Eigen::Vector3f(0.3f, 0.07f, 0.03f);
+  write_mesh_ply(dir / kBeside, beside.mesh, beside.frame);
 }
 
 std::string typed(const std::string& name, const test::TempDir& dir) {
   std::string arguments = cases().at(name).arguments;
-  if (arguments == kSecond || arguments == kSolid || name == "transform") {
-    arguments = (dir / arguments).string();
-  }
+  const bool is_file = arguments == kSecond || arguments == kSolid || arguments == kBeside;
+  if (is_file || name == "transform") arguments = (dir / arguments).string();
   return arguments.empty() ? name : name + "=" + arguments;
 }
 
