@@ -78,8 +78,9 @@ struct Sums {
 
 TriangleMesh down_sampled(const TriangleMesh& cloud, double side) {
   require(side > 0, "the side of a cube must be > 0", side);
-  require(
-      cloud.faces.empty(), "the number of faces of what cubes thin must be 0", cloud.faces.size());
+  require(cloud.faces.empty(),
+          "thinning by cubes needs a point cloud: the number of faces must be 0",
+          cloud.faces.size());
   const Cubes cubes = cubes_of(cloud, side);
   std::vector<uint8_t> only_sure(cubes.count, 0);
   for (size_t v = 0; v < cloud.vertices.size(); ++v) {

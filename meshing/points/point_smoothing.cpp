@@ -90,7 +90,7 @@ SmoothedPoints smoothed_points(const TriangleMesh& cloud, size_t neighbors) {
   require(
       neighbors >= kLeast, "the number of neighbours to smooth points by must be >= 6", neighbors);
   require(cloud.faces.empty(),
-          "the number of faces of what is smoothed as points must be 0",
+          "smoothing points needs a point cloud: the number of faces must be 0",
           cloud.faces.size());
   require(
       cloud.vertices.size() >= neighbors,

@@ -173,7 +173,7 @@ void weaken_by_corners(TriangleMesh& mesh, const StatedSurface& source) {
 
 InterpolatedSurface advancing_front(const TriangleMesh& cloud, double max_edge) {
   require(cloud.faces.empty(),
-          "the number of faces of what is joined as points must be 0",
+          "joining points needs a point cloud: the number of faces must be 0",
           cloud.faces.size());
   require(cloud.vertices.size() >= 3,
           "the number of points of a surface must be >= 3",

@@ -28,7 +28,7 @@ constexpr std::ptrdiff_t kLeast = 10;  // points with a normal
 
 void check_cloud(const TriangleMesh& cloud) {
   require(cloud.faces.empty(),
-          "the number of faces of what Poisson's surface is made from must be 0",
+          "Poisson's surface needs a point cloud: the number of faces must be 0",
           cloud.faces.size());
   const auto known = std::count_if(cloud.normals.begin(), cloud.normals.end(), is_known_normal);
   require(known >= kLeast,
@@ -38,7 +38,9 @@ void check_cloud(const TriangleMesh& cloud) {
 
 double default_spacing(size_t points, double point_spacing) {
   constexpr double kAtFullDetail = 200'000;
-  require(point_spacing > 0, "the spacing of most points must be > 0", point_spacing);
+  require(point_spacing > 0,
+          "most points lie in one place: the spacing between them must be > 0",
+          point_spacing);
   return point_spacing * std::max(1.0, std::sqrt(double(points) / kAtFullDetail));
 }
 

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
+#include "tests/support/scene_files.h"
 
 namespace cgs::down_sampling_test {
 namespace {
@@ -69,6 +70,8 @@ TEST(DownSampling, RefusesMeshesAndGridsBeyondCounting) {
   EXPECT_THROW(down_sampled(cloud, 0), InvalidInput);
   cloud.faces = {{0, 1, 2}};
   EXPECT_THROW(down_sampled(cloud, 1), InvalidInput);
+  EXPECT_EQ(test::message_of([&] { down_sampled(cloud, 1); }),
+            "thinning by cubes needs a point cloud: the number of faces must be 0, but is 1");
 }
 
 }  // namespace

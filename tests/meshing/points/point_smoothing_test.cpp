@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/solid_meshes.h"
 #include "tests/support/sphere_cloud.h"
 
@@ -97,7 +98,10 @@ TEST(SmoothedPoints, HoldWhereNoSurfaceCanBeLaid) {
 TEST(SmoothedPoints, RefuseWhatIsOutOfRange) {
   EXPECT_THROW(smoothed_points(test::sphere_cloud(100), 5), InvalidInput);
   EXPECT_THROW(smoothed_points(test::sphere_cloud(10), 12), InvalidInput);
-  EXPECT_THROW(smoothed_points(test::cube_mesh(1).mesh, 6), InvalidInput);
+  const TriangleMesh cube = test::cube_mesh(1).mesh;
+  EXPECT_THROW(smoothed_points(cube, 6), InvalidInput);
+  EXPECT_EQ(test::message_of([&] { smoothed_points(cube, 6); }),
+            "smoothing points needs a point cloud: the number of faces must be 0, but is 12");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "libcgs/core/error.h"
 #include "meshing/mesh/certificate.h"
 #include "meshing/mesh/vertex_attributes.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/solid_meshes.h"
 #include "tests/support/sphere_cloud.h"
 
@@ -189,7 +190,10 @@ TEST(AdvancingFront, JoinsAPlane) {
 }
 
 TEST(AdvancingFront, RefusesWhatItCannotUse) {
-  EXPECT_THROW(advancing_front(test::cube_mesh(1).mesh), InvalidInput);
+  const TriangleMesh cube = test::cube_mesh(1).mesh;
+  EXPECT_THROW(advancing_front(cube), InvalidInput);
+  EXPECT_EQ(test::message_of([&] { advancing_front(cube); }),
+            "joining points needs a point cloud: the number of faces must be 0, but is 12");
   EXPECT_THROW(advancing_front(test::sphere_cloud(2)), InvalidInput);
   EXPECT_THROW(advancing_front(test::sphere_cloud(50), 0), InvalidInput);
   TriangleMesh line;

@@ -11,6 +11,7 @@
 #include "meshing/mesh/certificate.h"
 #include "meshing/mesh/vertex_attributes.h"
 #include "tests/support/remedy_of_refusal.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/solid_meshes.h"
 #include "tests/support/sphere_cloud.h"
 
@@ -199,11 +200,16 @@ TEST(PoissonSurface, RefusesWhatItCannotUse) {
   bare.normals.clear();
   EXPECT_THROW(poisson_surface(bare, {}), InvalidInput);
   EXPECT_THROW(poisson_surface(test::sphere_cloud(9), {}), InvalidInput);
-  EXPECT_THROW(poisson_surface(test::cube_mesh(1).mesh, {}), InvalidInput);
+  const TriangleMesh cube = test::cube_mesh(1).mesh;
+  EXPECT_THROW(poisson_surface(cube, {}), InvalidInput);
+  EXPECT_EQ(test::message_of([&] { poisson_surface(cube, {}); }),
+            "Poisson's surface needs a point cloud: the number of faces must be 0, but is 12");
   EXPECT_THROW(poisson_surface(test::sphere_cloud(100), {.spacing = -1}), InvalidInput);
   TriangleMesh one_place = test::sphere_cloud(100);
   for (auto& p : one_place.vertices) p = {1, 2, 3};
   EXPECT_THROW(poisson_surface(one_place, {}), InvalidInput);
+  EXPECT_EQ(test::message_of([&] { poisson_surface(one_place, {}); }),
+            "most points lie in one place: the spacing between them must be > 0, but is 0");
   EXPECT_THROW(poisson_surface(one_place, {.spacing = 0.06}), NumericalError);
 }
 
