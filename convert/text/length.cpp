@@ -158,7 +158,9 @@ double parse_seconds(const std::string& text, const std::string& option) {
   for (const auto& [name, seconds] :
        {std::pair("", 1.0), std::pair("s", 1.0), std::pair("min", 60.0), std::pair("h", 3600.0)}) {
     constexpr double kLongest = 1e9;  // thirty years, of any work
-    if (unit == name && value * seconds <= kLongest) return value * seconds;
+    if (unit != name) continue;
+    if (value * seconds <= kLongest) return value * seconds;
+    throw InvalidInput(quoted(text, option) + " is longer than thirty years");
   }
   throw InvalidInput(quoted(text, option) + " is not a time; write 90s, 3min or 1.5h");
 }

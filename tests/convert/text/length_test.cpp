@@ -90,6 +90,12 @@ TEST(ParseLength, NamesTheOptionThatTheTextWasGivenTo) {
             "--marker-size: 'x' is not a positive length");
   EXPECT_EQ(message([] { parse_seconds("soon", "--budget"); }),
             "--budget: 'soon' is not a positive time");
+  EXPECT_EQ(message([] { parse_seconds("3m", "--budget"); }),
+            "--budget: '3m' is not a time; write 90s, 3min or 1.5h");
+  EXPECT_EQ(message([] { parse_seconds("1e10", "--budget"); }),
+            "--budget: '1e10' is longer than thirty years");
+  EXPECT_EQ(message([] { parse_seconds("1e308h", "--budget"); }),
+            "--budget: '1e308h' is longer than thirty years");
   EXPECT_EQ(message([] { parse_length("-5", {}); }), "'-5' is not a positive length");
 }
 
