@@ -8,7 +8,8 @@
 
 namespace cgs {
 
-// What is typed, and read here, may be given an option that messages begin with, "--voxel-size".
+// Messages begin with `option`, the name of what was typed, such as "--voxel-size"; it may be
+// empty.
 
 /// Metres in a unit of length: "m", "cm", "mm", "um", "km", "in", "ft".
 /// \throws InvalidInput that lists the units.
