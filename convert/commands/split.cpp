@@ -38,16 +38,10 @@ std::string group_name(size_t i, size_t count) {
   return "group_" + std::string(std::to_string(count).size() - number.size(), '0') + number;
 }
 
-void require_listable(const std::string& name) {
-  if (is_listable(name)) return;
-  throw InvalidInput("photograph " + printable(name) +
-                     " has a comma in its name, which ends a name in --views; rename it");
-}
-
 // Names as --views takes them.
 std::vector<std::string> listable_names(const std::vector<int>& views, const Scene& scene) {
   std::vector<std::string> out = view_names(scene, views);
-  for (const std::string& name : out) require_listable(name);
+  for (const std::string& name : out) require_listable(name, "--views");
   return out;
 }
 
@@ -56,7 +50,7 @@ void refuse_unlistable(const SceneRequest& request) {
   if (!request.options.views.empty() || !is_photographs(request.path)) return;
   for (const PhotoFile& photograph :
        list_photographs({request.path, request.options.allow_external})) {
-    require_listable(photograph.path.filename().string());
+    require_listable(photograph.path.filename().string(), "--views");
   }
 }
 

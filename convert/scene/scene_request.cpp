@@ -77,10 +77,7 @@ std::vector<std::string> names_of(const Scene& named, const std::string& views) 
   if (views.empty()) return out;
   for (const int i : select_views(named, views)) {
     const std::string name = named.views[static_cast<size_t>(i)].image_path.filename().string();
-    if (!is_listable(name)) {
-      throw InvalidInput("--views: photograph " + printable(name) +
-                         " has a comma in its name, which ends a name there; rename it");
-    }
+    require_listable(name, "--views");
     out.push_back(name);
   }
   return out;

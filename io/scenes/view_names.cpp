@@ -159,6 +159,12 @@ std::vector<int> select_views(const Scene& scene, const std::string& list) {
 
 bool is_listable(const std::string& name) { return name.find(',') == std::string::npos; }
 
+void require_listable(const std::string& name, const std::string& option) {
+  if (is_listable(name)) return;
+  throw InvalidInput("photograph " + printable(name) +
+                     " has a comma in its name, which ends a name in " + option + "; rename it");
+}
+
 std::string view_list(const std::vector<std::string>& names) {
   std::string out;
   for (const std::string& name : names) out += (out.empty() ? "" : ",") + name;

@@ -44,6 +44,11 @@ std::vector<int> select_views(const Scene& scene, const std::string& list);
 /// Whether such a list can hold the name: a comma ends a name there.
 bool is_listable(const std::string& name);
 
+/// Refuses the name of a photograph that such a list cannot hold.
+/// \param option  that takes the list, for messages
+/// \throws InvalidInput unless is_listable()
+void require_listable(const std::string& name, const std::string& option);
+
 /// Such a list of names.
 /// \pre is_listable() of each
 std::string view_list(const std::vector<std::string>& names);

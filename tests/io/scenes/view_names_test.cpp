@@ -82,6 +82,12 @@ TEST(ViewNames, ListsAreSortedAndNameNobodyTwice) {
             std::string::npos);
 }
 
+TEST(ViewNames, CommasEndNamesInLists) {
+  require_listable("a b.jpg", "--views");
+  EXPECT_EQ(test::message_of([] { require_listable("a,b.jpg", "--views"); }),
+            "photograph a,b.jpg has a comma in its name, which ends a name in --views; rename it");
+}
+
 TEST(ViewNames, MessagesNameFive) {
   EXPECT_EQ(first_few({"a", "b"}), "a, b");
   EXPECT_EQ(first_few({"a", "b", "c", "d", "e", "f"}), "a, b, c, d, e, …");
