@@ -157,17 +157,11 @@ VolumeObject joined(const std::vector<const ModelObject*>& models,
 py::object evaluated(const ModelObject& m, const std::string& views, const py::object& progress) {
   const std::vector<int> wanted =
       views.empty() ? m.model.scene.held_out : select_views(m.model.scene, views);
-  const size_t known = m.model.scene.warnings.size();
-  std::vector<std::string> warnings;
-  py::object out = python_of(result_of(progress, [&](Terminal& terminal) {
-    Model own =
-        m.model;  // takes photographs and warnings; other threads may look at the shared one
-    auto found = evaluation_to_json(evaluate_views(own, wanted, terminal.begin("evaluate")));
-    warnings = std::move(own.scene.warnings);
-    return found;
-  }));
-  warn(warnings, known);
-  return out;
+  const Evaluation found = result_of(progress, [&](Terminal& terminal) {
+    return evaluate_views(m.model, wanted, terminal.begin("evaluate"));
+  });
+  warn(found.warnings);
+  return python_of(evaluation_to_json(found));
 }
 
 // What an input view knows, in arrays of its own.

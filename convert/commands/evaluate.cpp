@@ -86,11 +86,9 @@ void run_evaluate(const EvaluateArgs& args) {
     throw InvalidInput("--views: the photograph of view " + printable(view.name) +
                        " is gone; --scene says where the photographs are");
   }
-  const size_t told = model.scene.warnings.size();
   const Evaluation evaluation = evaluate_views(model, views, terminal.begin("evaluate"), args.fill);
   terminal.end(std::to_string(evaluation.views.size()) + " views");
-  const auto& warnings = model.scene.warnings;
-  terminal.warn(std::vector(warnings.begin() + static_cast<std::ptrdiff_t>(told), warnings.end()));
+  terminal.warn(evaluation.warnings);
   const nlohmann::ordered_json report = evaluation_to_json(evaluation);
   if (args.common.json) {
     print_report(report);

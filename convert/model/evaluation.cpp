@@ -41,8 +41,9 @@ double share_of(const MaskMap& part, const MaskMap& whole) {
 EvaluatedView evaluate_view(const Model& model,
                             const std::vector<SupportView>& inputs,
                             const ModelPictures& pictures,
-                            int index) {
-  View view = model.scene.views[static_cast<size_t>(index)];
+                            int index,
+                            std::vector<std::string>& warnings) {
+  View view = loaded_view(model.scene, index, /*with_image=*/true, warnings);
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
   const ColorImage shown = blackened(pictures.of(buffers, view.camera), view.valid);
   MaskMap seen = hole_mask(buffers);
@@ -136,13 +137,15 @@ std::optional<ViewFigures> mean_of_every_eighth(const std::vector<EvaluatedView>
 }
 
 // Those that have a photograph. \throws BadInput if none has
-std::vector<int> with_photograph(Scene& scene, const std::vector<int>& views) {
+std::vector<int> with_photograph(const Scene& scene,
+                                 const std::vector<int>& views,
+                                 std::vector<std::string>& warnings) {
   std::vector<int> out;
   for (const int i : views) {
     const View& view = scene.views[static_cast<size_t>(i)];
     if (view.image_path.empty()) {
-      scene.warnings.push_back("view " + printable(view.name) +
-                               " has no photograph and is not evaluated");
+      warnings.push_back("view " + printable(view.name) +
+                         " has no photograph and is not evaluated");
     } else {
       out.push_back(i);
     }
@@ -197,26 +200,23 @@ Json evaluation_to_json(const Evaluation& evaluation) {
   return out;
 }
 
-Evaluation evaluate_views(Model& model,
+Evaluation evaluate_views(const Model& model,
                           const std::vector<int>& views,
                           const Progress& progress,
                           HoleFill fill) {
-  std::vector<std::string>& warnings = model.scene.warnings;
+  Evaluation out;
   if (const std::string text = unknown_holes_warning(model); !text.empty()) {
-    warnings.push_back(text);
+    out.warnings.push_back(text);
   }
-  const std::vector<int> shown = with_photograph(model.scene, views);
+  const std::vector<int> shown = with_photograph(model.scene, views, out.warnings);
   const std::vector<SupportView> inputs = support_views(model);
   const ModelPictures pictures(model, {fill, /*through_water=*/true});
-  Evaluation out;
   out.through_water = model.scene.water.has_value();
   for (size_t k = 0; k < shown.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(shown.size()));
-    load_images(model.scene, {shown[k]});
-    out.views.push_back(evaluate_view(model, inputs, pictures, shown[k]));
-    model.scene.views[static_cast<size_t>(shown[k])].image = {};  // one photograph at a time
+    out.views.push_back(evaluate_view(model, inputs, pictures, shown[k], out.warnings));
   }
-  out.mean = mean_of(out.views, warnings);
+  out.mean = mean_of(out.views, out.warnings);
   out.every_eighth = mean_of_every_eighth(out.views, model.scene);
   report(progress, 1);
   return out;

@@ -42,7 +42,8 @@ struct Evaluation {
   /// "NeRF", 6.1); where the scene is one, and these were evaluated and no inputs.
   std::optional<ViewFigures> every_eighth;
   std::vector<EvaluatedView> views;
-  bool through_water = false;  ///< Rendered through the water that the photographs show.
+  bool through_water = false;         ///< Rendered through the water that the photographs show.
+  std::vector<std::string> warnings;  ///< One line each.
 };
 
 /// {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim", "flip"}, null for what is
@@ -54,17 +55,17 @@ nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
 
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
 /// that are not holes, and MS-SSIM and FLIP over all. Pictures are those of write_views(), but for
-/// what was painted (Model::fill), which no figure rests on. Loads the photographs.
+/// what was painted (Model::fill), which no figure rests on. Photographs are loaded one at a time.
 ///
 /// Where the exposures of input views were matched, the photographs of others are matched to what
 /// is rendered, by factors on red, green and blue light. Where water was taken out of them,
 /// pictures are rendered through it: they are held against real photographs, never against what an
 /// estimate makes of these.
 ///
-/// Input views stay out of the mean where there are others. Warnings of the scene tell where there
-/// are none, and where nothing is known of holes, whose figures are then empty.
+/// Input views stay out of the mean where there are others. Warnings tell where there are none, and
+/// where nothing is known of holes, whose figures are then empty.
 /// \throws BadInput if none of the views has a photograph.
-Evaluation evaluate_views(Model& model,
+Evaluation evaluate_views(const Model& model,
                           const std::vector<int>& views,
                           const Progress& progress,
                           HoleFill fill = HoleFill::Around);

@@ -175,7 +175,7 @@ StageResult run_views(Run& run, const Progress& progress) {
 }
 
 StageResult run_evaluation(Run& run, const Progress& progress) {
-  Model& model = loaded_model(run);
+  const Model& model = loaded_model(run);
   if (model.scene.held_out.empty()) return {};
   return {evaluation_to_json(evaluate_views(model, model.scene.held_out, progress))};
 }

@@ -71,7 +71,7 @@ std::string evidence_of_thinned(const Model& model, size_t kept) {
 }
 
 // How the splats of a model show what was held out.
-std::optional<ViewFigures> held_out_figures(Model& model, const Progress& progress) {
+std::optional<ViewFigures> held_out_figures(const Model& model, const Progress& progress) {
   if (model.scene.held_out.empty()) return std::nullopt;
   return evaluate_views(model, model.scene.held_out, progress, HoleFill::None).mean;
 }
