@@ -78,7 +78,7 @@ void save(const ModelObject& model, const std::filesystem::path& folder, bool ov
   work_beside(py::none(), [&] {
     const NewFolder made(folder);
     const FolderLock lock(folder);
-    refuse_to_replace_model(folder, overwrite);
+    refuse_to_replace_model(folder, overwrite, "overwrite=True");
     write_model(folder, model.model);
   });
 }
@@ -218,13 +218,13 @@ void add_methods(Class& model) {
           py::arg("name"),
           "What an input view knows: a dict of new arrays, height x width: \"depth\" and \"sigma\" "
           "[world units] and \"origin\", as DEPTH_ORIGIN has it.")
-      .def(
-          "save",
-          save,
-          py::arg("folder"),
-          py::kw_only(),
-          py::arg("overwrite") = false,
-          "Writes a model folder, as the program does. overwrite: also where a finished model is.");
+      .def("save",
+           save,
+           py::arg("folder"),
+           py::kw_only(),
+           py::arg("overwrite") = false,
+           "Writes a model folder, as the program does. Where a finished model is, it raises "
+           "InvalidInput unless overwrite is True: say so before long work.");
 }
 
 }  // namespace

@@ -299,7 +299,9 @@ void keep_scene_apart(const std::filesystem::path& output,
   }
 }
 
-void refuse_to_replace_model(const std::filesystem::path& output, bool overwrite) {
+void refuse_to_replace_model(const std::filesystem::path& output,
+                             bool overwrite,
+                             const std::string& how) {
   std::error_code error;
   const auto folder = std::filesystem::weakly_canonical(output, error);
   if (folder.filename() == "model" && is_present(folder.parent_path() / "run.json")) {
@@ -312,14 +314,13 @@ void refuse_to_replace_model(const std::filesystem::path& output, bool overwrite
                        " holds a run, which has a model of its own; choose another folder");
   }
   if (overwrite) return;
+  const std::string remedy = "; choose another folder, or say " + how;
   if (is_present(output / "cameras.json")) {
-    throw InvalidInput(printable(output) +
-                       " holds a finished model; choose another folder, or say --overwrite");
+    throw InvalidInput(printable(output) + " holds a finished model" + remedy);
   }
   if (is_present(output / "gaussians.ply") && !has_checkpoints(output)) {
-    throw InvalidInput(printable(output) +
-                       " holds gaussians.ply, which no training here wrote; choose another folder, "
-                       "or say --overwrite");
+    throw InvalidInput(printable(output) + " holds gaussians.ply, which no training here wrote" +
+                       remedy);
   }
 }
 

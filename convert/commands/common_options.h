@@ -105,8 +105,11 @@ void keep_scene_apart(const std::filesystem::path& output,
 /// Refuses a model folder that holds something: a model may have taken hours, and a run vouches for
 /// the one it made.
 /// \param overwrite  a finished model may go, but not that of a run
+/// \param how        what the caller is to say for that, for messages
 /// \throws InvalidInput
-void refuse_to_replace_model(const std::filesystem::path& output, bool overwrite);
+void refuse_to_replace_model(const std::filesystem::path& output,
+                             bool overwrite,
+                             const std::string& how = "--overwrite");
 
 /// Keeps every library within the number of threads for the rest of the program.
 /// \throws InvalidInput if it is negative or above 1024.

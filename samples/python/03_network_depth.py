@@ -21,7 +21,7 @@ def main(scene_folder: str, views: str, depth_folder: str, output: str) -> None:
         view = scene.views[i]
         view.depth = np.load(Path(depth_folder) / f"{view.name}.npy")
     model = cgs.reconstruct(scene, preset="draft")
-    model.save(output)
+    model.save(output, overwrite=True)  # where a finished model is, too
     for name in model.input:
         origin = model.input_depth(name)["origin"]
         shares = [f"{(origin == k).mean():.0%} {kind}" for k, kind in enumerate(cgs.DEPTH_ORIGIN)]

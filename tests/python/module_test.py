@@ -82,7 +82,7 @@ class Reconstruction(unittest.TestCase):
         self.model.save(saved)
         splats = "gaussians.ply"
         self.assertEqual((saved / splats).read_bytes(), (self.folder / splats).read_bytes())
-        with self.assertRaisesRegex(cgs.InvalidInput, "holds a finished model"):
+        with self.assertRaisesRegex(cgs.InvalidInput, "holds a finished model; .*say overwrite=True"):
             self.model.save(saved)
         self.model.save(saved, overwrite=True)
         again = cgs.read_model(self.folder)
