@@ -134,8 +134,8 @@ void add_program(py::module_& module) {
       R"(The commands of the program, on files: cgs.program.run("photos/portal", output="out").
 
 Options are those of the command line with _ for -, a flag is True or False, a list stands for
-several values. Each returns what the command prints with --json, as dict or list, and raises cgs.Error where the
-program would end with an error.)");
+several values. Each returns what the command prints with --json, as dict or list, and raises
+cgs.Error where the program would end with an error.)");
   CLI::App app("", "cgs");
   add_commands(app);
   for (const CLI::App* command : app.get_subcommands({})) {

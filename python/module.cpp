@@ -22,13 +22,14 @@ constexpr const char* kGuide =
 Coordinates and lengths are those of the world: what the files of the scene have, in its unit.
 Cameras look along +z, with +x to the right and +y down; pixel (0, 0) is at the top left and its
 centre at (0.5, 0.5); depth is along z, NaN where it is unknown. Colours are sRGB-coded, 0 to 1.
-Arrays are views of what an object holds, and may be changed in place, unless it says "new".
+Arrays are views of what an object holds, and may be changed in place, unless it says "new" or
+"read only".
 
 Long work lets other Python threads run. What takes `progress` calls it, if given, with the name
 of the stage and the fraction done, and stops within a moment at Ctrl-C, as does certificate();
-measuring, comparing, rendering, reading and saving come to their end first. What is odd but usable becomes a
-UserWarning, what cannot be used one of the exceptions below cgs.Error, with the words of the
-program. cgs.program has the commands of the program, on files.)";
+measuring, comparing, rendering, reading and saving come to their end first. What is odd but usable
+becomes a UserWarning, what cannot be used one of the exceptions below cgs.Error, with the words of
+the program. cgs.program has the commands of the program, on files.)";
 
 }  // namespace
 
