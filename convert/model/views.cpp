@@ -285,9 +285,10 @@ std::vector<RenderedPicture> write_path(const Model& model,
                                         const Progress& progress,
                                         const PictureOptions& shown) {
   make_output_folder(folder);
-  remove_frames(folder);
+  (void)earlier_frames(folder);
   const std::vector<SupportView> inputs = support_views(model);
   const ModelPictures pictures(model, shown);
+  remove_frames(folder);
   write_cameras_json(folder / "cameras.json", scene_of_cameras(model, path, frame_name));
   constexpr size_t kOnSheet = 12;
   const auto place_on_sheet = [&](size_t k) { return k * kOnSheet / path.size(); };

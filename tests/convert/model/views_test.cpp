@@ -15,6 +15,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/exr_channel.h"
 #include "tests/support/grey_model.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/splat_shapes.h"
 #include "tests/support/temp_dir.h"
 
@@ -69,6 +70,24 @@ TEST(WritePath, ReplacesAnEarlierPathAndNothingElse) {
     EXPECT_THROW(write_path(model, {camera}, dir / "path", {}), InvalidInput);
     EXPECT_EQ(test::read_bytes(file), others);
     EXPECT_TRUE(std::filesystem::exists(dir / "path" / "frame_0001.png"));
+  }
+}
+
+// Of a photograph that is too large to be opened.
+TEST(WritePath, LeavesAnEarlierPathWholeWhereItCannotBegin) {
+  const test::TempDir dir;
+  Model model = model_of_greys(dir, 2);
+  say_that_it_saw_nothing(model, 0);
+  const Camera& camera = model.scene.views[0].camera;
+  write_path(model, {camera, camera}, dir / "path", {});
+  const std::string header =
+      test::png_chunk("IHDR",
+                      test::big_endian(uint32_t{30000}) + test::big_endian(uint32_t{30000}) +
+                          std::string("\x08\x02\0\0\0", 5));
+  test::write_bytes(model.scene.views[0].image_path, "\x89PNG\r\n\x1a\n" + header);
+  EXPECT_THROW(write_path(model, {camera}, dir / "path", {}), LimitError);
+  for (const char* name : {"frame_0000.png", "frame_0001.png", "cameras.json"}) {
+    EXPECT_TRUE(std::filesystem::exists(dir / "path" / name)) << name;
   }
 }
 
