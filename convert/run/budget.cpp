@@ -14,6 +14,7 @@
 #include "convert/model/model_training.h"
 #include "convert/run/pipeline.h"
 #include "convert/run/request_fields.h"
+#include "convert/run/run_files.h"
 #include "convert/run/small_run.h"
 #include "convert/run/time_model.h"
 #include "convert/text/length.h"
@@ -371,7 +372,12 @@ RunRequest within_budget(const RunRequest& request,
   if (request.scene.options.downscale) {
     throw InvalidInput("--budget chooses the size of the pictures; give it or --downscale");
   }
+  const auto refuse_foreign = [&](const Scene& scene) {
+    if (!request.overwrite) refuse_foreign_files(request.output, stage_files(scene, request.lods));
+  };
+  refuse_foreign({});  // before minutes are spent on cameras
   const OpenedScene opened = open_scene_of(request, terminal);
+  refuse_foreign(opened.scene);
   RunRequest full = request;
   full.scene.options.views = views_of_run(request, opened.scene);
   full.scene.options.downscale = 1;

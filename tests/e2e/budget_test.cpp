@@ -76,6 +76,19 @@ TEST_F(Budget, TooLittleTimeIsRefusedAndNothingStays) {
   EXPECT_FALSE(fs::exists(out()));
 }
 
+TEST_F(Budget, FilesOfOthersAreFoundBeforeAnythingIsTried) {
+  make_capture(3);
+  for (const char* name : {"report.html", "views/view_01.color.png"}) {
+    test::write_bytes(out() / name, "mine");
+    const auto result = run("10h");
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_NE(result.err.find(name + std::string(" but no run.json")), std::string::npos)
+        << result.err;
+    EXPECT_FALSE(fs::exists(out() / "budget.json"));
+    fs::remove_all(out());
+  }
+}
+
 TEST_F(Budget, WhatItChoosesMayNotBeStatedToo) {
   for (const char* stated :
        {"--downscale 2", "--preset draft", "--set steps=5", "--set steps=60"}) {
