@@ -51,6 +51,7 @@ void run_tradeoff(const TradeoffArgs& args) {
   Terminal terminal(args.common.quiet, args.common.strict);
   const NewFolder folder(request.output);
   const CostMeter meter;
+  // Keeps no cameras yet: another start would read them, and take that for the cost of solving.
   const OpenedScene opened = open_scene(request.scene, request.output, terminal);
   const StageCost opening = meter.read();
   terminal.note(opened.scene.notes);
