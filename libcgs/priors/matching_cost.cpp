@@ -21,7 +21,7 @@ constexpr int kBandRows = 32;
 constexpr float kCensusWeight = 0.6f;
 constexpr float kNoiseVariance = 4.0f;  // [gray levels squared]
 constexpr int kLevels = 64;             // of the census, in a gray level
-constexpr int16_t kCensusNoise = 96;    // [levels of the census] a level and a half
+constexpr int16_t kCensusNoise = 88;    // [levels of the census] 1.4 gray levels
 constexpr float kUnseen = 1e9f;
 constexpr float kNeutral = 0.5f;  // cost of a plane that no source sees
 

@@ -93,10 +93,15 @@ class Reconstruction(unittest.TestCase):
         volume, meshes = Path(WORK) / "v.vdb", Path(WORK) / "meshes"
         program("fuse", self.folder, "-o", volume)
         program("mesh", volume, "--simplify", "0", "-o", meshes)
-        mesh = self.model.fuse().watertight()
+        mesh = cgs.read_model(self.folder).fuse().watertight()
         mesh.save(Path(WORK) / "closed.ply")
         closed = meshes / "watertight.ply"
         self.assertEqual((Path(WORK) / "closed.ply").read_bytes(), closed.read_bytes())
+        # Files of splats round their colours.
+        unsaved = self.model.fuse().watertight()
+        np.testing.assert_array_equal(unsaved.vertices, mesh.vertices)
+        np.testing.assert_array_equal(unsaved.faces, mesh.faces)
+        np.testing.assert_allclose(unsaved.colors, mesh.colors, atol=1e-6)
         self.assertTrue(mesh.certificate()["passed"])
         figures = cgs.read_mesh(closed).measure(volume=True, distance=((0, 0, 4), (1, 0, 4)))
         told = program("measure", closed, "--volume", "--distance", "0,0,4", "1,0,4")["figures"]
