@@ -21,7 +21,7 @@ constexpr double kPi = std::numbers::pi;
 
 // A torus with bumps: nothing about it is convex, and it has a handle.
 TriangleMesh bumpy_ring() {
-  TriangleMesh out = test::torus_mesh(1, 0.4, 64, 32).mesh;
+  TriangleMesh out = test::torus_mesh(1, 0.4, 96, 48).mesh;
   const std::vector<Eigen::Vector3f> normals = vertex_normals(out);
   for (size_t v = 0; v < normals.size(); ++v) {
     const Eigen::Vector3f& p = out.vertices[v];
