@@ -198,8 +198,7 @@ size_t earlier_frames(const std::filesystem::path& folder) {
 }
 
 // Those of a longer path must not follow the new ones.
-void remove_frames(const std::filesystem::path& folder) {
-  const size_t earlier = earlier_frames(folder);
+void remove_frames(const std::filesystem::path& folder, size_t earlier) {
   for (size_t k = 0; k < earlier; ++k) {
     for (const std::string& name : pictures_of_frame(k)) std::filesystem::remove(folder / name);
   }
@@ -285,10 +284,10 @@ std::vector<RenderedPicture> write_path(const Model& model,
                                         const Progress& progress,
                                         const PictureOptions& shown) {
   make_output_folder(folder);
-  (void)earlier_frames(folder);
+  const size_t earlier = earlier_frames(folder);
   const std::vector<SupportView> inputs = support_views(model);
   const ModelPictures pictures(model, shown);
-  remove_frames(folder);
+  remove_frames(folder, earlier);
   write_cameras_json(folder / "cameras.json", scene_of_cameras(model, path, frame_name));
   constexpr size_t kOnSheet = 12;
   const auto place_on_sheet = [&](size_t k) { return k * kOnSheet / path.size(); };

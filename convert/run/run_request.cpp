@@ -2,12 +2,10 @@
 #include "convert/run/run_request.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
-
-#include <nlohmann/json.hpp>
 
 #include "convert/model/simplification.h"
 #include "convert/text/length.h"

@@ -7,6 +7,7 @@
 
 #include "convert/scene/photo_poses.h"
 #include "convert/scene/refined_poses.h"
+#include "io/bytes/atomic_file.h"
 #include "io/bytes/scene_path.h"
 #include "io/scenes/view_names.h"
 

@@ -164,15 +164,20 @@ TEST(RestateFrame, WritesSplatsAnewThatAnotherProgramChanged) {
   EXPECT_NE(test::read_bytes(dir / "gaussians.ply").find("comment up 1 0 0"), std::string::npos);
 }
 
-TEST(ReadModel, KnowsWhichViewDrawsAPlace) {
-  const test::TempDir dir;
-  Model model = model_of_one_view(dir.path());
-  ViewPriors priors;
+// Of one view, all of whose pixels are measured.
+Model measured_model(const std::filesystem::path& folder) {
+  Model model = model_of_one_view(folder);
+  ViewPriors& priors = model.priors.emplace_back();
   priors.depth = priors.sigma = priors.confidence = DepthMap(2, 2, 1);
   priors.layer = priors.matched_views = Raster<uint8_t>(2, 2, 0);
   priors.origin = Raster<DepthOrigin>(2, 2, DepthOrigin::Measured);
-  model.priors = {priors};
   model.scene.input = {0};
+  return model;
+}
+
+TEST(ReadModel, KnowsWhichViewDrawsAPlace) {
+  const test::TempDir dir;
+  Model model = measured_model(dir.path());
   write_model(dir.path(), model);
   EXPECT_TRUE(read_model(dir.path()).priors[0].shown_finer.empty());
   model.priors[0].shown_finer = MaskMap(2, 2, 0);
@@ -184,13 +189,7 @@ TEST(ReadModel, KnowsWhichViewDrawsAPlace) {
 // 257 would be Measured in a byte, 261 Estimated.
 TEST(ReadModel, RefusesLabelsThatNoByteHolds) {
   const test::TempDir dir;
-  Model model = model_of_one_view(dir.path());
-  ViewPriors priors;
-  priors.depth = priors.sigma = priors.confidence = DepthMap(2, 2, 1);
-  priors.layer = priors.matched_views = Raster<uint8_t>(2, 2, 0);
-  priors.origin = Raster<DepthOrigin>(2, 2, DepthOrigin::Measured);
-  model.priors = {priors};
-  model.scene.input = {0};
+  Model model = measured_model(dir.path());
   write_model(dir.path(), model);
   const std::filesystem::path file = dir / "priors/a.exr";
   const ExrImage good = read_exr(file);
@@ -214,7 +213,7 @@ TEST(ReadModel, RefusesLabelsThatNoByteHolds) {
     }
   }
   write_exr(file, good);
-  EXPECT_EQ(read_model(dir.path()).priors[0].origin.data, priors.origin.data);
+  EXPECT_EQ(read_model(dir.path()).priors[0].origin.data, model.priors[0].origin.data);
 }
 
 // The cameras of such scenes are in a file that states no frame, those of their models are not.

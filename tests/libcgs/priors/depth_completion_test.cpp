@@ -117,6 +117,16 @@ TEST(CompleteDepth, LeavesMeasuredPixelsAndTrustsOthersLessTheFartherTheyAre) {
   EXPECT_EQ(e.priors.confidence(50, 10), 0);
 }
 
+// Completes a view beside a second one, to the left, that measures `seen` everywhere.
+void complete_beside(float seen, const DepthCompletionOptions& options, Example& e) {
+  Example witness(60, 20);
+  witness.view.camera.world_from_cam.translation().x() = -0.2;
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 60; ++x) witness.measure(x, y, seen);
+  }
+  complete_depth(e.priors, e.view, options, {{&witness.view.camera, &witness.priors}});
+}
+
 // A gap between surfaces at depths 2 and 5, all of one colour, so near the left rim its pixels
 // would go with the nearer one; a second view, to the left, measures `seen` everywhere.
 Example gap_with_witness(float seen) {
@@ -127,13 +137,7 @@ Example gap_with_witness(float seen) {
       if (x >= 35) e.measure(x, y, 5);
     }
   }
-  Example witness(60, 20);
-  witness.view.camera.world_from_cam.translation().x() = -0.2;
-  for (int y = 0; y < 20; ++y) {
-    for (int x = 0; x < 60; ++x) witness.measure(x, y, seen);
-  }
-  complete_depth(
-      e.priors, e.view, {.background_share = 1}, {{&witness.view.camera, &witness.priors}});
+  complete_beside(seen, {.background_share = 1}, e);
   return e;
 }
 
@@ -149,12 +153,7 @@ TEST(CompleteDepth, MovesBackWhereOtherViewsLeaveNoEvidence) {
   for (int y = 0; y < 20; ++y) {
     for (int x = 0; x < 25; ++x) e.measure(x, y, 2);
   }
-  Example witness(60, 20);
-  witness.view.camera.world_from_cam.translation().x() = -0.2;
-  for (int y = 0; y < 20; ++y) {
-    for (int x = 0; x < 60; ++x) witness.measure(x, y, 4);
-  }
-  complete_depth(e.priors, e.view, {}, {{&witness.view.camera, &witness.priors}});
+  complete_beside(4, {}, e);
   // As near as the margin of the test and the step of the search allow.
   EXPECT_NEAR(e.priors.depth(30, 10), 4, 0.05 * 4);
 }
@@ -164,12 +163,7 @@ TEST(CompleteDepth, LeavesOpenWhatWouldStandFarBeforeWhatAnotherViewMeasured) {
   for (int y = 0; y < 20; ++y) {
     for (int x = 0; x < 25; ++x) e.measure(x, y, 2);
   }
-  Example witness(60, 20);
-  witness.view.camera.world_from_cam.translation().x() = -0.2;
-  for (int y = 0; y < 20; ++y) {
-    for (int x = 0; x < 60; ++x) witness.measure(x, y, 40);
-  }
-  complete_depth(e.priors, e.view, {}, {{&witness.view.camera, &witness.priors}});
+  complete_beside(40, {}, e);
   for (int x = 25; x < 50; ++x) {
     EXPECT_EQ(e.priors.origin(x, 10), DepthOrigin::Unknown) << x;
     EXPECT_TRUE(std::isnan(e.priors.depth(x, 10))) << x;
@@ -185,12 +179,7 @@ TEST(CompleteDepth, LeavesNothingInTheWayOfAnotherViewAfterSmoothing) {
       if (x >= 35) e.measure(x, y, 2.08f);
     }
   }
-  Example witness(60, 20);
-  witness.view.camera.world_from_cam.translation().x() = -0.2;
-  for (int y = 0; y < 20; ++y) {
-    for (int x = 0; x < 60; ++x) witness.measure(x, y, 2.2f);
-  }
-  complete_depth(e.priors, e.view, {}, {{&witness.view.camera, &witness.priors}});
+  complete_beside(2.2f, {}, e);
   const float in_the_way = 0.97f * 2.2f;
   for (int x = 25; x < 35; ++x) EXPECT_GE(e.priors.depth(x, 10), in_the_way - 1e-4f) << x;
 }

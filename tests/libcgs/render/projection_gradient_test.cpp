@@ -9,19 +9,12 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/largest.h"
+#include "tests/support/oblique_camera.h"
 
 namespace cgs::projection_gradient_test {
 namespace {
 
-Camera oblique_camera() {
-  Camera camera{.width = 37, .height = 26, .fx = 41, .fy = 38, .cx = 17.3, .cy = 14.1};
-  camera.world_from_cam.translation() << 0.3, -0.2, -0.4;
-  camera.world_from_cam.linear() = (Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX()) *
-                                    Eigen::AngleAxisd(-0.3, Eigen::Vector3d::UnitY()) *
-                                    Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ()))
-                                       .toRotationMatrix();
-  return camera;
-}
+using test::oblique_camera;
 
 constexpr SplatGradient kGradient{
     .u = 0.7, .v = -1.1, .cov_xx = 0.13, .cov_xy = -0.21, .cov_yy = 0.08, .depth = 3};

@@ -12,6 +12,7 @@
 #include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
+#include "tests/support/oblique_camera.h"
 #include "tests/support/reference_rasterizer.h"
 
 namespace cgs::rasterizer_test {
@@ -19,14 +20,15 @@ namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-// Neither the image nor the principal point is a multiple of anything.
+// A larger one.
 Camera oblique_camera() {
-  Camera camera{.width = 53, .height = 38, .fx = 61, .fy = 57, .cx = 24.3, .cy = 20.1};
-  camera.world_from_cam.translation() << 0.3, -0.2, -0.4;
-  camera.world_from_cam.linear() = (Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX()) *
-                                    Eigen::AngleAxisd(-0.3, Eigen::Vector3d::UnitY()) *
-                                    Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ()))
-                                       .toRotationMatrix();
+  Camera camera = test::oblique_camera();
+  camera.width = 53;
+  camera.height = 38;
+  camera.fx = 61;
+  camera.fy = 57;
+  camera.cx = 24.3;
+  camera.cy = 20.1;
   return camera;
 }
 

@@ -19,22 +19,14 @@
 #include "libcgs/core/error.h"
 #include "libcgs/render/projection_gradient.h"
 #include "libcgs/render/rasterizer.h"
+#include "tests/support/oblique_camera.h"
 #include "tests/support/reference_rasterizer.h"
 #include "tests/support/reference_training_rasterizer.h"
 
 namespace cgs::training_rasterizer_test {
 namespace {
 
-// Neither the image nor the principal point is a multiple of anything.
-Camera oblique_camera() {
-  Camera camera{.width = 37, .height = 26, .fx = 41, .fy = 38, .cx = 17.3, .cy = 14.1};
-  camera.world_from_cam.translation() << 0.3, -0.2, -0.4;
-  camera.world_from_cam.linear() = (Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX()) *
-                                    Eigen::AngleAxisd(-0.3, Eigen::Vector3d::UnitY()) *
-                                    Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ()))
-                                       .toRotationMatrix();
-  return camera;
-}
+using test::oblique_camera;
 
 struct Spread {
   int count = 40;
