@@ -68,13 +68,13 @@ bool is_done(const Run& run, const StageFiles& stage) {
 
 Json result_of(const Run& run, Stage stage) { return run.record.result(traits(stage).name); }
 
-// What photographs may be kept in [bytes]: some of what no stage needs.
 size_t most_memory(const std::vector<StageMemory>& plan) {
   size_t most = 0;
   for (const StageMemory& stage : plan) most = std::max(most, stage.bytes);
   return most;
 }
 
+// What photographs may be kept in [bytes]: some of what no stage needs.
 size_t spare_memory(const std::vector<StageMemory>& plan, size_t budget) {
   return std::min(kKeptPhotographs, budget - std::min(budget, most_memory(plan)));
 }
