@@ -20,6 +20,8 @@ constexpr int kZnccRadius = 2;
 constexpr int kBandRows = 32;
 constexpr float kCensusWeight = 0.6f;
 constexpr float kNoiseVariance = 4.0f;  // [gray levels squared]
+constexpr int kLevels = 64;             // of the census, in a gray level
+constexpr int16_t kCensusNoise = 112;   // [levels of the census] a level and three quarters
 constexpr float kUnseen = 1e9f;
 constexpr float kNeutral = 0.5f;  // cost of a plane that no source sees
 
@@ -55,7 +57,7 @@ struct Band {
         gray[start + width - 1 + k] = gray[start + width - 1];
       }
     }
-    for (size_t i = 0; i < gray.size(); ++i) level[i] = static_cast<int16_t>(gray[i] * 64);
+    for (size_t i = 0; i < gray.size(); ++i) level[i] = static_cast<int16_t>(gray[i] * kLevels);
   }
 };
 
@@ -111,7 +113,9 @@ void warp_row(const SweepImage& image,
   }
 }
 
-/// The census of a row: which of the 48 neighbours of a pixel are brighter than it, 16 in a word.
+/// The census of a row: which of the 48 neighbours of a pixel are brighter than it by more than
+/// noise, 16 in a word. (By noise alone half of them would be on an even wall, others in every
+/// photograph.)
 class CensusRow {
  public:
   static constexpr int kWords = 3;
@@ -160,7 +164,7 @@ class CensusRow {
     uint16_t* out = words_.data() + static_cast<size_t>(kWord) * static_cast<size_t>(width);
     for (int x = 0; x < width; x += kShortLanes) {
       x = std::min(x, std::max(width - kShortLanes, 0));  // the last ones overlap those before
-      const auto middle = load<Shorts>(center + x);
+      const auto middle = load<Shorts>(center + x) + kCensusNoise;
       Shorts word{};
       for (const int16_t* from : neighbor) word += word - (load<Shorts>(from + x) > middle);
       store_first(word, width, out + x);
