@@ -49,27 +49,44 @@ Json to_json(const PaintedPictures& painted, const PaintedFill& fill, const Mode
           {"unpainted", painted.unpainted}};
 }
 
+std::string count_of(const PaintedFill& fill) {
+  return std::to_string(fill.gaussians.size()) + " synthetic Gaussians";
+}
+
+PaintedBySurroundings from_painter(const Model& model, const FillArgs& args, Terminal& terminal) {
+  PaintedBySurroundings out;
+  out.painted = read_painted_pictures(model, args.painted, terminal.begin("compare"));
+  terminal.end(std::to_string(out.painted.views.size()) + " painted pictures");
+  for (const std::string& name : out.painted.unpainted) {
+    terminal.note({name + " is not painted and left out"});
+  }
+  out.fill = lift_painted(model, out.painted.views, terminal.begin("lift"));
+  terminal.end(count_of(out.fill));
+  return out;
+}
+
+PaintedBySurroundings from_surroundings(const Model& model, Terminal& terminal) {
+  PaintedBySurroundings out = paint_surroundings(model, terminal.begin("paint"));
+  terminal.end(count_of(out.fill));
+  return out;
+}
+
 void run_fill(const FillArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.model);
-  keep_apart(args.output, args.painted);
+  if (!args.painted.empty()) keep_apart(args.output, args.painted);
   refuse_to_replace_model(args.output, args.overwrite);
   Terminal terminal(args.common.quiet, args.common.strict);
   const Model model = read_model(args.model);
   terminal.warn(model.scene.warnings);
-  const PaintedPictures painted =
-      read_painted_pictures(model, args.painted, terminal.begin("compare"));
-  terminal.end(std::to_string(painted.views.size()) + " painted pictures");
-  for (const std::string& name : painted.unpainted) {
-    terminal.note({name + " is not painted and left out"});
-  }
-  const PaintedFill fill = lift_painted(model, painted.views, terminal.begin("lift"));
-  terminal.end(std::to_string(fill.gaussians.size()) + " synthetic Gaussians");
-  if (fill.gaussians.size() == 0) {
+  const PaintedBySurroundings made = args.painted.empty() ? from_surroundings(model, terminal)
+                                                          : from_painter(model, args, terminal);
+  if (made.fill.gaussians.size() == 0) {
     throw NumericalError("nothing that was painted is hidden from all input views");
   }
-  write_filled_model(args.model, model, fill.gaussians, args.output);
-  const Json report = to_json(painted, fill, model);
+  write_filled_model(args.model, model, made.fill.gaussians, args.output);
+  if (!made.pngs.empty()) write_surroundings(args.output, made);
+  const Json report = to_json(made.painted, made.fill, model);
   terminal.say("synthetic: " + percent(report["synthetic_fraction"].get<double>()) +
                " of all Gaussians; pictures show them, and nothing measures them");
   if (args.common.json) print_report(report);
@@ -79,22 +96,26 @@ void run_fill(const FillArgs& args) {
 
 void add_fill(CLI::App& app) {
   auto args = std::make_shared<FillArgs>();
-  auto* cmd = app.add_subcommand("fill", "What you painted into holes, as splats beside a model");
+  auto* cmd = app.add_subcommand(
+      "fill", "Holes of pictures filled, as splats beside a model: from around, or as you painted");
   cmd->add_option("model", args->model, "Model folder, e.g. out/portal/model")->required();
   cmd->add_option("painted",
                   args->painted,
                   "Folder of cgs render --holes whose pictures were painted in the white of their "
-                  "masks, and nowhere else")
-      ->required();
+                  "masks, and nowhere else; default: pieces of what is around the holes are "
+                  "painted in them, where they do not open in the sky");
   cmd->add_option("-o,--output", args->output, "Model folder to write: the model with fill.ply")
       ->required();
   cmd->add_flag("-w,--overwrite", args->overwrite, "Replace a finished model");
   add_output_options(*cmd, args->common);
   cmd->footer(
-      "Pictures to paint are those of cgs render out/portal/model --holes -o out/holes; paint in\n"
-      "out/holes/hole_1.png and so on.\n"
-      "Example: cgs fill out/portal/model out/holes -o out/filled\n"
+      "Example: cgs fill out/portal/model -o out/filled\n"
+      "         cgs fill out/portal/model out/holes -o out/filled\n"
       "         cgs render out/filled --path spiral -o out/spiral\n"
+      "         cgs convert out/filled filled.glb --as splats\n"
+      "Pictures to paint are those of cgs render out/portal/model --holes -o out/holes; paint in\n"
+      "out/holes/hole_1.png and so on. Those that the program painted are in\n"
+      "out/filled/surroundings.\n"
       "The evidence keeps its bits. fill.ply is tagged synthetic, with the SHA-256 of each\n"
       "picture; pictures and splat files show it, and no mesh, mask or figure takes it.");
   cmd->callback([args] { run_fill(*args); });

@@ -22,6 +22,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/priors/mask_operations.h"
 #include "libcgs/reconstruct/hole_views.h"
+#include "libcgs/reconstruct/surroundings_painter.h"
 #include "libcgs/render/hidden_depth.h"
 #include "libcgs/render/picture.h"
 
@@ -173,8 +174,19 @@ std::optional<PaintedView> painted_view(const Model& model,
   const ShownView shown = shown_view(model, inputs, camera);
   check_seen(path, picture, shown.plain, shown.holes);
   if (!is_changed(picture, shown)) return std::nullopt;
-  return PaintedView{camera, std::move(picture), {path.filename().string(), sha256(bytes)}};
+  return PaintedView{camera, std::move(picture), {path.filename().string(), sha256(bytes)}, {}};
 }
+
+HoleViews views_with_holes(const Model& model, const Progress& progress) {
+  HoleViews out = hole_views(model, progress);
+  if (out.cameras.empty()) {
+    throw NumericalError("no hole is seen by any of " + std::to_string(out.candidates) +
+                         " cameras around the input views");
+  }
+  return out;
+}
+
+std::string hole_name(size_t k) { return "hole_" + std::to_string(k + 1); }
 
 }  // namespace
 
@@ -187,16 +199,11 @@ HolePictures write_hole_pictures(const Model& model,
     throw InvalidInput(printable(folder) +
                        " has a cameras.json: pictures there may be painted; choose another folder");
   }
-  const HoleViews chosen = hole_views(model, part_of(progress, 0, 0.8));
-  if (chosen.cameras.empty()) {
-    throw NumericalError("no hole is seen by any of " + std::to_string(chosen.candidates) +
-                         " cameras around the input views");
-  }
+  const HoleViews chosen = views_with_holes(model, part_of(progress, 0, 0.8));
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
   const ModelPictures pictures(model, {.fill = fill});
-  const Scene scene = scene_of_cameras(
-      model, chosen.cameras, [](size_t k) { return "hole_" + std::to_string(k + 1); });
+  const Scene scene = scene_of_cameras(model, chosen.cameras, hole_name);
   // Called cameras.json when all is there: pictures beside that may be painted.
   const std::filesystem::path unfinished = folder / "cameras.unfinished.json";
   write_cameras_json(unfinished, scene);
@@ -252,6 +259,35 @@ PaintedPictures read_painted_pictures(const Model& model,
   }
   report(progress, 1);
   return out;
+}
+
+PaintedBySurroundings paint_surroundings(const Model& model, const Progress& progress) {
+  const HoleViews chosen = views_with_holes(model, part_of(progress, 0, 0.5));
+  PaintedBySurroundings out;
+  const auto paint = [&](size_t k, const ViewToPaint& view) {
+    PaintedSurroundings painted = painted_surroundings(view);
+    out.pngs.push_back(encode_png(painted.picture));
+    out.painted.names.push_back(hole_name(k));
+    out.painted.views.push_back(
+        {chosen.cameras[k],
+         std::move(painted.picture),
+         {std::string(kSurroundingsFolder) + "/" + hole_name(k) + ".png", sha256(out.pngs[k])},
+         std::move(painted.left_open)});
+    return out.painted.views.back();
+  };
+  out.fill = lift_painted(model, chosen.cameras, paint, part_of(progress, 0.5, 1));
+  return out;
+}
+
+void write_surroundings(const std::filesystem::path& model, const PaintedBySurroundings& painted) {
+  make_output_folder(model / kSurroundingsFolder);
+  for (size_t k = 0; k < painted.pngs.size(); ++k) {
+    write_file(model / painted.painted.views[k].source.file, painted.pngs[k]);
+  }
+  size_t earlier = painted.pngs.size();
+  while (std::filesystem::remove(model / kSurroundingsFolder / (hole_name(earlier) + ".png"))) {
+    ++earlier;
+  }
 }
 
 }  // namespace cgs

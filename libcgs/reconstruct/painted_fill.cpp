@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/nan.h"
 #include "libcgs/reconstruct/synthetic_sight.h"
 #include "libcgs/render/hidden_depth.h"
 #include "libcgs/render/membrane.h"
@@ -23,7 +24,7 @@ namespace {
 
 /// A painted view and what is known of its holes.
 struct Painting {
-  const PaintedView& view;
+  PaintedView view;
   RenderBuffers shown;  ///< With what earlier views painted.
   MaskMap open;         ///< 1 = to be filled from this one.
   DepthMap depth;       ///< Of what is painted; NaN = nowhere.
@@ -34,11 +35,11 @@ constexpr std::array<std::pair<int, int>, 4> kNeighbours = {{{-1, 0}, {1, 0}, {0
 Painting painting_of(const Model& model,
                      const std::vector<SupportView>& inputs,
                      const Gaussians& earlier,
-                     const PaintedView& view,
+                     const Camera& camera,
                      ViewFill& report) {
-  Painting out{view, render_camera(model, inputs, view.camera), {}, {}};
-  const RenderBuffers fill = rasterize(earlier, view.camera);
-  out.open = MaskMap(view.camera.width, view.camera.height, 0);
+  Painting out{{camera, {}, {}, {}}, render_camera(model, inputs, camera), {}, {}};
+  const RenderBuffers fill = rasterize(earlier, camera);
+  out.open = MaskMap(camera.width, camera.height, 0);
   for (size_t i = 0; i < out.open.data.size(); ++i) {
     if (!is_hole(out.shown.hole.data[i])) continue;
     ++report.holes;
@@ -49,6 +50,22 @@ Painting painting_of(const Model& model,
   out.shown = with_fill(std::move(out.shown), fill);
   out.depth = hidden_depth(out.shown, out.open);
   return out;
+}
+
+void check_size(const PaintedView& view, const Camera& camera) {
+  require(view.picture.width == camera.width && view.picture.height == camera.height,
+          "a painted picture must be of the size of its camera; its width",
+          view.picture.width);
+}
+
+void take_view(PaintedView view, Painting& painting) {
+  check_size(view, painting.view.camera);
+  for (size_t i = 0; i < view.left_open.data.size(); ++i) {
+    if (view.left_open.data[i] == 0) continue;
+    painting.open.data[i] = 0;
+    painting.depth.data[i] = kNaN;
+  }
+  painting.view = std::move(view);
 }
 
 // Moves painted pixels out of the way of input views.
@@ -180,17 +197,12 @@ Gaussians discs_of(const Painting& painting, const ColorImage& colors) {
   return out;
 }
 
-void check_painted(const Model& model, const std::vector<PaintedView>& views) {
+void check_painted(const Model& model, size_t views) {
   require(!model.priors.empty(),
           "what is a hole is told by the input views of a model; the number of these",
           model.priors.size());
   constexpr size_t kMost = 255;
-  require(views.size() <= kMost, "the number of painted views must be <= 255", views.size());
-  for (const PaintedView& view : views) {
-    require(view.picture.width == view.camera.width && view.picture.height == view.camera.height,
-            "a painted picture must be of the size of its camera; its width",
-            view.picture.width);
-  }
+  require(views <= kMost, "the number of painted views must be <= 255", views);
 }
 
 }  // namespace
@@ -198,14 +210,29 @@ void check_painted(const Model& model, const std::vector<PaintedView>& views) {
 PaintedFill lift_painted(const Model& model,
                          const std::vector<PaintedView>& views,
                          const Progress& progress) {
-  check_painted(model, views);
+  std::vector<Camera> cameras;
+  for (const PaintedView& view : views) {
+    check_size(view, view.camera);
+    cameras.push_back(view.camera);
+  }
+  return lift_painted(
+      model, cameras, [&views](size_t k, const ViewToPaint&) { return views[k]; }, progress);
+}
+
+PaintedFill lift_painted(const Model& model,
+                         const std::vector<Camera>& cameras,
+                         const HolePainter& paint,
+                         const Progress& progress) {
+  check_painted(model, cameras.size());
   const std::vector<SupportView> inputs = support_views(model);
   const SyntheticSight sight(model);
   PaintedFill out;
-  for (size_t k = 0; k < views.size(); ++k) {
-    report(progress, double(k) / double(views.size()));
+  for (size_t k = 0; k < cameras.size(); ++k) {
+    report(progress, double(k) / double(cameras.size()));
     ViewFill& told = out.views.emplace_back();
-    Painting painting = painting_of(model, inputs, out.gaussians, views[k], told);
+    Painting painting = painting_of(model, inputs, out.gaussians, cameras[k], told);
+    take_view(paint(k, {cameras[k], inputs, painting.shown, painting.open, painting.depth}),
+              painting);
     clear_sights(inputs, painting, told);
     const size_t before = out.gaussians.size();
     append(out.gaussians, discs_of(painting, without_seams(painting)));
@@ -214,7 +241,7 @@ PaintedFill lift_painted(const Model& model,
   }
   // Those of an earlier view may only show once a later one is there.
   const std::vector<uint8_t>& tags = out.gaussians.synthetic;
-  for (size_t k = 0; k < views.size(); ++k) {
+  for (size_t k = 0; k < cameras.size(); ++k) {
     ViewFill& told = out.views[k];
     const auto kept = std::count(tags.begin(), tags.end(), static_cast<uint8_t>(k + 1));
     told.shone_through = told.lifted - static_cast<size_t>(kept);

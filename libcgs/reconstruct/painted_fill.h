@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "libcgs/core/camera.h"
@@ -9,6 +10,7 @@
 #include "libcgs/core/progress.h"
 #include "libcgs/core/raster.h"
 #include "libcgs/reconstruct/model.h"
+#include "libcgs/render/render_buffers.h"
 
 namespace cgs {
 
@@ -17,7 +19,20 @@ struct PaintedView {
   Camera camera;       ///< [internal units]
   ColorImage picture;  ///< Of the size of the camera.
   SyntheticSource source;
+  MaskMap left_open;  ///< 1 = a hole that was not painted; empty = none.
 };
+
+/// A view that is to be painted.
+struct ViewToPaint {
+  const Camera& camera;
+  const std::vector<SupportView>& inputs;  ///< Of the model.
+  const RenderBuffers& shown;  ///< The model as seen from there, with what was painted before.
+  const MaskMap& open;         ///< 1 = a hole to be painted.
+  const DepthMap& hidden;      ///< hidden_depth() of these.
+};
+
+/// Paints the view at a position in the list of cameras.
+using HolePainter = std::function<PaintedView(size_t, const ViewToPaint&)>;
 
 /// What became of the holes of a painted view [pixels].
 struct ViewFill {
@@ -53,6 +68,13 @@ struct PaintedFill {
 /// Source: seams: Pérez et al. 2003, "Poisson Image Editing", with an offset that fades out.
 PaintedFill lift_painted(const Model& model,
                          const std::vector<PaintedView>& views,
+                         const Progress& progress = {});
+
+/// The same of views that are painted one after the other, each by one who sees what was painted
+/// in those before.
+PaintedFill lift_painted(const Model& model,
+                         const std::vector<Camera>& cameras,
+                         const HolePainter& paint,
                          const Progress& progress = {});
 
 }  // namespace cgs

@@ -100,6 +100,26 @@ class FillTest(unittest.TestCase):
         holes = sum(view['hole_pixels'] - view['filled_before'] for view in self.fill['views'])
         self.assertGreater(self.fill['splats'], 0.5 * holes)
 
+    def test_the_program_paints_where_nobody_does(self):
+        made = told('fill', 'model', '-o', 'by_itself')
+        comments, made_up = splats('by_itself/fill.ply')
+        self.assertEqual(len(made_up['x']), made['splats'])
+        self.assertGreater(made['splats'], 0.2 * self.fill['splats'])
+        self.assertTrue((made_up['synthetic'] >= 1).all() and (made_up['provenance'] == 0).all())
+        for k, view in enumerate(made['views'], 1):
+            self.assertEqual(view['file'], f"surroundings/{view['name']}.png")
+            digest = hashlib.sha256((FOLDER / 'by_itself' / view['file']).read_bytes()).hexdigest()
+            self.assertEqual(view['sha256'], digest)
+            self.assertIn(f"synthetic {k} sha256:{digest} {view['file']}", comments)
+        for name in EVIDENCE:
+            same = (FOLDER / 'model' / name).read_bytes() == (FOLDER / 'by_itself' / name).read_bytes()
+            self.assertTrue(same, name)
+        self.assertEqual(told('evaluate', 'model'), told('evaluate', 'by_itself'))
+        (FOLDER / 'by_itself/surroundings' / f"hole_{len(made['views']) + 1}.png").write_bytes(b'of an earlier fill')
+        cgs('fill', 'model', '-o', 'by_itself', '-w', '--threads', 1)
+        self.assertEqual(len(list((FOLDER / 'by_itself/surroundings').iterdir())), len(made['views']))
+        self.assertEqual(splats('by_itself/fill.ply')[1]['x'].tobytes(), made_up['x'].tobytes())
+
     def test_no_model_is_replaced_by_accident(self):
         before = (FOLDER / 'filled/fill.ply').read_bytes()
         said = cgs('fill', 'model', 'holes', '-o', 'filled', code=2).stderr

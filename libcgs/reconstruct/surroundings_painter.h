@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "libcgs/core/raster.h"
+#include "libcgs/reconstruct/painted_fill.h"
+
+namespace cgs {
+
+/// What a program paints into holes where nobody else does.
+struct PaintedSurroundings {
+  ColorImage picture;
+  MaskMap left_open;  ///< 1 = a hole that is not painted.
+};
+
+/// Paints the holes of a view with pieces of what is shown around them: exemplar_fill() by depth.
+///
+/// Left open are holes of which other things are known, or too little: what an input view looks at
+/// without knowing a surface there, for its photograph shows something else, or sky; holes in the
+/// sky, by the shown pixel next to them, where what is painted would stand in the air; and what
+/// lies farther than a twelfth of the picture's width from anything that is shown.
+PaintedSurroundings painted_surroundings(const ViewToPaint& view);
+
+}  // namespace cgs
