@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -21,7 +22,7 @@ using Json = nlohmann::ordered_json;
 
 struct FillArgs {
   std::filesystem::path model;
-  std::filesystem::path painted;
+  std::optional<std::filesystem::path> painted;
   std::filesystem::path output;
   bool overwrite = false;
   CommonOptions common;
@@ -37,6 +38,7 @@ Json to_json(const PaintedPictures& painted, const PaintedFill& fill, const Mode
                      {"sha256", source.sha256},
                      {"hole_pixels", view.holes},
                      {"filled_before", view.filled_before},
+                     {"left_open", view.left_open},
                      {"lifted", view.lifted},
                      {"moved_back", view.moved_back},
                      {"unplaced", view.unplaced},
@@ -50,12 +52,20 @@ Json to_json(const PaintedPictures& painted, const PaintedFill& fill, const Mode
 }
 
 std::string count_of(const PaintedFill& fill) {
-  return std::to_string(fill.gaussians.size()) + " synthetic Gaussians";
+  size_t holes = 0;
+  size_t left_open = 0;
+  for (const ViewFill& view : fill.views) {
+    holes += view.holes;
+    left_open += view.left_open;
+  }
+  std::string out = std::to_string(fill.gaussians.size()) + " synthetic Gaussians";
+  if (left_open == 0) return out;
+  return out + "; " + percent(double(left_open) / double(holes)) + " of the holes stay open";
 }
 
-PaintedBySurroundings from_painter(const Model& model, const FillArgs& args, Terminal& terminal) {
-  PaintedBySurroundings out;
-  out.painted = read_painted_pictures(model, args.painted, terminal.begin("compare"));
+PaintedHoles from_painter(const Model& model, const FillArgs& args, Terminal& terminal) {
+  PaintedHoles out;
+  out.painted = read_painted_pictures(model, *args.painted, terminal.begin("compare"));
   terminal.end(std::to_string(out.painted.views.size()) + " painted pictures");
   for (const std::string& name : out.painted.unpainted) {
     terminal.note({name + " is not painted and left out"});
@@ -65,8 +75,8 @@ PaintedBySurroundings from_painter(const Model& model, const FillArgs& args, Ter
   return out;
 }
 
-PaintedBySurroundings from_surroundings(const Model& model, Terminal& terminal) {
-  PaintedBySurroundings out = paint_surroundings(model, terminal.begin("paint"));
+PaintedHoles from_surroundings(const Model& model, Terminal& terminal) {
+  PaintedHoles out = paint_surroundings(model, terminal.begin("paint"));
   terminal.end(count_of(out.fill));
   return out;
 }
@@ -74,18 +84,20 @@ PaintedBySurroundings from_surroundings(const Model& model, Terminal& terminal) 
 void run_fill(const FillArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.model);
-  if (!args.painted.empty()) keep_apart(args.output, args.painted);
+  if (args.painted) keep_apart(args.output, *args.painted);
   refuse_to_replace_model(args.output, args.overwrite);
   Terminal terminal(args.common.quiet, args.common.strict);
   const Model model = read_model(args.model);
   terminal.warn(model.scene.warnings);
-  const PaintedBySurroundings made = args.painted.empty() ? from_surroundings(model, terminal)
-                                                          : from_painter(model, args, terminal);
+  const PaintedHoles made =
+      args.painted ? from_painter(model, args, terminal) : from_surroundings(model, terminal);
   if (made.fill.gaussians.size() == 0) {
-    throw NumericalError("nothing that was painted is hidden from all input views");
+    throw NumericalError(args.painted
+                             ? "nothing that was painted is hidden from all input views"
+                             : "nothing can be painted: all holes are looked at by a photograph, "
+                               "lie in the sky, or are too far from what photographs show");
   }
-  write_filled_model(args.model, model, made.fill.gaussians, args.output);
-  if (!made.pngs.empty()) write_surroundings(args.output, made);
+  write_filled_model(args.model, model, made.fill.gaussians, made.pictures, args.output);
   const Json report = to_json(made.painted, made.fill, model);
   terminal.say("synthetic: " + percent(report["synthetic_fraction"].get<double>()) +
                " of all Gaussians; pictures show them, and nothing measures them");

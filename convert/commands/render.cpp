@@ -42,8 +42,8 @@ void render_holes(const RenderArgs& args, const Model& model, Terminal& terminal
       write_hole_pictures(model, args.output, args.shown.fill, terminal.begin("holes"));
   terminal.end(std::to_string(made.pictures.size()) + " pictures see " + percent(made.covered) +
                " of the holes that " + std::to_string(made.candidates) + " cameras see");
-  terminal.say("paint in the white of the masks, then cgs fill; see " +
-               printable(args.output / "README.txt"));
+  terminal.say("paint in the white of the masks, then cgs fill MODEL " + printable(args.output) +
+               "; see " + printable(args.output / "README.txt"));
   if (args.common.json) print_report(hole_pictures_to_json(made));
 }
 
@@ -106,10 +106,11 @@ void add_render(CLI::App& app) {
   path->excludes(views);
   cmd->add_option("--frames", args->frames, "Number of pictures along a path; default 60")
       ->needs(path);
-  cmd->add_flag("--holes",
-                args->holes,
-                "Pictures to paint the holes of the model in, from few cameras that see nearly all "
-                "of them, with masks, depth and cameras instead; cgs fill takes them back")
+  cmd->add_flag(
+         "--holes",
+         args->holes,
+         "Pictures to paint the holes of the model in, from few cameras that see nearly all "
+         "of them, with masks, depth and cameras instead; cgs fill MODEL FOLDER takes them back")
       ->excludes(views)
       ->excludes(path);
   add_fill_option(*cmd, args->shown.fill);

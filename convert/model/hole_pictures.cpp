@@ -261,33 +261,23 @@ PaintedPictures read_painted_pictures(const Model& model,
   return out;
 }
 
-PaintedBySurroundings paint_surroundings(const Model& model, const Progress& progress) {
+PaintedHoles paint_surroundings(const Model& model, const Progress& progress) {
   const HoleViews chosen = views_with_holes(model, part_of(progress, 0, 0.5));
-  PaintedBySurroundings out;
+  PaintedHoles out;
   const auto paint = [&](size_t k, const ViewToPaint& view) {
     PaintedSurroundings painted = painted_surroundings(view);
-    out.pngs.push_back(encode_png(painted.picture));
+    const std::string file = std::string(kSurroundingsFolder) + "/" + hole_name(k) + ".png";
+    std::string png = encode_png(painted.picture);
     out.painted.names.push_back(hole_name(k));
-    out.painted.views.push_back(
-        {chosen.cameras[k],
-         std::move(painted.picture),
-         {std::string(kSurroundingsFolder) + "/" + hole_name(k) + ".png", sha256(out.pngs[k])},
-         std::move(painted.left_open)});
+    out.painted.views.push_back({chosen.cameras[k],
+                                 std::move(painted.picture),
+                                 {file, sha256(png)},
+                                 std::move(painted.left_open)});
+    out.pictures[file] = std::move(png);
     return out.painted.views.back();
   };
   out.fill = lift_painted(model, chosen.cameras, paint, part_of(progress, 0.5, 1));
   return out;
-}
-
-void write_surroundings(const std::filesystem::path& model, const PaintedBySurroundings& painted) {
-  make_output_folder(model / kSurroundingsFolder);
-  for (size_t k = 0; k < painted.pngs.size(); ++k) {
-    write_file(model / painted.painted.views[k].source.file, painted.pngs[k]);
-  }
-  size_t earlier = painted.pngs.size();
-  while (std::filesystem::remove(model / kSurroundingsFolder / (hole_name(earlier) + ".png"))) {
-    ++earlier;
-  }
 }
 
 }  // namespace cgs

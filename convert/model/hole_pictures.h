@@ -7,6 +7,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "convert/model/model.h"
 #include "convert/model/model_pictures.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/reconstruct/model.h"
@@ -58,22 +59,16 @@ PaintedPictures read_painted_pictures(const Model& model,
                                       const std::filesystem::path& folder,
                                       const Progress& progress);
 
-/// What the program itself painted into the holes of a model.
-struct PaintedBySurroundings {
-  PaintedPictures painted;  ///< Their files are kSurroundingsFolder/NAME.png.
-  std::vector<std::string> pngs;
+/// Pictures in whose holes something was painted, and what was made of them.
+struct PaintedHoles {
+  PaintedPictures painted;
+  PicturesBeside pictures;  ///< If the program painted: these, to be kept beside the fill.
   PaintedFill fill;
 };
-
-/// The folder beside a fill with the pictures that the program painted.
-inline constexpr const char* kSurroundingsFolder = "surroundings";
 
 /// Paints the holes as seen from the cameras of hole_views() with painted_surroundings(), and makes
 /// Gaussians of them.
 /// \throws InvalidInput, NumericalError as write_hole_pictures()
-PaintedBySurroundings paint_surroundings(const Model& model, const Progress& progress);
-
-/// Writes the pictures into the folder of the model; those of an earlier fill go.
-void write_surroundings(const std::filesystem::path& model, const PaintedBySurroundings& painted);
+PaintedHoles paint_surroundings(const Model& model, const Progress& progress);
 
 }  // namespace cgs

@@ -148,7 +148,26 @@ std::set<std::filesystem::path> priors_in(const std::filesystem::path& folder) {
   return out;
 }
 
-void write_fill(const std::filesystem::path& folder, const Gaussians& fill, const Frame& frame) {
+// Removes the pictures of an earlier fill.
+void remove_pictures(const std::filesystem::path& folder) {
+  const std::filesystem::path pictures = folder / kSurroundingsFolder;
+  if (!is_folder(pictures)) return;
+  for (const std::string& name : sorted_entries(pictures)) {
+    if (name.starts_with("hole_") && name.ends_with(".png")) {
+      std::filesystem::remove(pictures / name);
+    }
+  }
+  std::error_code holds_other_files;
+  std::filesystem::remove(pictures, holds_other_files);
+}
+
+void write_fill(const std::filesystem::path& folder,
+                const Gaussians& fill,
+                const PicturesBeside& pictures,
+                const Frame& frame) {
+  remove_pictures(folder);
+  if (!pictures.empty()) make_output_folder(folder / kSurroundingsFolder);
+  for (const auto& [name, bytes] : pictures) write_file(folder / name, bytes);
   if (fill.size() == 0) {
     std::filesystem::remove(folder / kFillFile);  // of another model
     return;
@@ -197,7 +216,7 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
     earlier.erase(priors_path(folder, view));
   }
   write_gaussian_ply(folder / "gaussians.ply", model.gaussians, model.scene.frame, model.evidence);
-  write_fill(folder, model.fill, model.scene.frame);
+  write_fill(folder, model.fill, {}, model.scene.frame);
   write_cameras_json(folder / "cameras.json", model.scene);  // last: by it the scale is told
   for (const std::filesystem::path& file : earlier) std::filesystem::remove(file);
 }
@@ -205,6 +224,7 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
 void write_filled_model(const std::filesystem::path& folder,
                         const Model& model,
                         const Gaussians& fill,
+                        const PicturesBeside& pictures,
                         const std::filesystem::path& output) {
   const std::filesystem::path from = model_folder(folder);
   std::set<std::filesystem::path> earlier = priors_in(output);
@@ -215,7 +235,7 @@ void write_filled_model(const std::filesystem::path& folder,
     earlier.erase(priors_path(output, view));
   }
   copy_bytes(from / "gaussians.ply", output / "gaussians.ply");
-  write_fill(output, fill, model.scene.frame);
+  write_fill(output, fill, pictures, model.scene.frame);
   copy_bytes(from / "cameras.json", output / "cameras.json");
   for (const std::filesystem::path& file : earlier) std::filesystem::remove(file);
 }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "libcgs/core/scene.h"
@@ -11,6 +13,8 @@ namespace cgs {
 
 /// The file in the folder of a model that holds Model::fill.
 inline constexpr const char* kFillFile = "fill.ply";
+/// The folder beside it with what the program painted: hole_1.png and so on.
+inline constexpr const char* kSurroundingsFolder = "surroundings";
 
 /// Where the files of a model are: in the folder, or in model/ of that of a run or of a group of
 /// views.
@@ -23,12 +27,17 @@ bool holds_model(const std::filesystem::path& folder);
 /// \throws IoError
 void write_model(const std::filesystem::path& folder, const Model& model);
 
+/// Pictures in the folder of a model: bytes by their names within.
+using PicturesBeside = std::map<std::string, std::string>;
+
 /// Copies the files of a model byte for byte, with another fill.
-/// \param folder  as read_model() takes it
+/// \param folder    as read_model() takes it
+/// \param pictures  what the program painted, in kSurroundingsFolder; those of an earlier fill go
 /// \throws BadInput; IoError
 void write_filled_model(const std::filesystem::path& folder,
                         const Model& model,
                         const Gaussians& fill,
+                        const PicturesBeside& pictures,
                         const std::filesystem::path& output);
 
 /// Writes anew what `model.scene.frame` tells of unit and up, in the files that write_model() wrote

@@ -26,7 +26,7 @@ struct PictureOptions {
 /// A picture for people.
 struct PaintedPicture {
   ColorImage color;
-  MaskMap painted;  ///< 1 = shows what somebody painted there; empty where nobody did.
+  MaskMap painted;  ///< 1 = shows what was painted there; empty where nothing was.
 };
 
 /// Makes the pictures of a model that people look at. `buffers` are of the camera, as

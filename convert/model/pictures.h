@@ -24,7 +24,7 @@ MaskMap hole_mask(const RenderBuffers& buffers);
 /// Pixels of both masks; an empty `b` has all.
 MaskMap intersection(const MaskMap& a, const MaskMap& b);
 
-/// sRGB-coded colours that mark what pictures show: holes, and what somebody painted there.
+/// sRGB-coded colours that mark what pictures show: holes, and what was painted there.
 inline const Eigen::Vector3f kHoleTint(0.9f, 0.1f, 0.8f);
 inline const Eigen::Vector3f kPaintedTint(0.45f, 0.15f, 1);
 

@@ -214,7 +214,7 @@ ColorImage thumbnail(ColorImage picture) {
   return picture;
 }
 
-// Holes in magenta, in violet where somebody painted.
+// Holes in magenta, in violet where something was painted.
 ColorImage with_tints(const PaintedPicture& shown, MaskMap holes) {
   for (size_t i = 0; i < shown.painted.data.size(); ++i) {
     if (shown.painted.data[i] != 0) holes.data[i] = 0;

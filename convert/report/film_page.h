@@ -9,7 +9,7 @@
 namespace cgs {
 
 /// film.html: plays the pictures that write_path() wrote into a folder, with what no photograph saw
-/// in magenta, and in violet what somebody painted there, at a key. The pictures stay files of
+/// in magenta, and in violet what was painted there, at a key. The pictures stay files of
 /// their own, beside the page.
 /// \throws IoError
 void write_film_page(const std::filesystem::path& folder,

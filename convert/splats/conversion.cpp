@@ -338,7 +338,7 @@ GaussianFile painted_splats(const Model& model) {
   return out;
 }
 
-/// Meshes and volumes take nothing that somebody painted.
+/// Meshes and volumes take nothing that was painted into holes.
 void leave_out_synthetic(GaussianFile& file, const ConversionRequest& request, Terminal& terminal) {
   const size_t count = synthetic_count(file.gaussians);
   if (count == 0) return;

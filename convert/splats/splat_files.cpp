@@ -141,12 +141,12 @@ Json synthetic_json(const Gaussians& g) {
   for (const auto& [file, hash] : g.synthetic_sources) {
     sources.push_back({{"file", file}, {"sha256", hash}});
   }
-  return {{"words",
-           "synthetic: " + share_text(count, g.size()) + " of the splats, from " +
-               std::to_string(sources.size()) + (sources.size() == 1 ? " picture" : " pictures") +
-               " that somebody painted"},
-          {"splats", count},
-          {"sources", sources}};
+  return {
+      {"words",
+       "synthetic: " + std::to_string(count) + " splats, from " + std::to_string(sources.size()) +
+           " painted picture" + (sources.size() == 1 ? "" : "s")},
+      {"splats", count},
+      {"sources", sources}};
 }
 
 /// Where a hundredth of the splats cannot be held as it is; "" elsewhere.

@@ -23,7 +23,7 @@ inline constexpr float kSplatDilation = 0.3f;
 
 /// A picture from elsewhere of which Gaussians were made up; empty texts = nobody says which.
 struct SyntheticSource {
-  std::string file;    ///< Its name, without folder.
+  std::string file;  ///< Its name, without folder unless it lies beside the file of the Gaussians.
   std::string sha256;  ///< Of its bytes, 64 hexadecimal digits.
   bool operator==(const SyntheticSource&) const = default;
 };

@@ -20,7 +20,7 @@ struct Model {
   Gaussians gaussians;
   std::vector<ViewPriors> priors;  ///< In the order of scene.input; empty for foreign splats.
   std::string evidence;  ///< What the Gaussians rest on, in words; empty where nobody says.
-  /// What somebody painted into holes of pictures, beside the Gaussians: pictures for people show
+  /// What was painted into holes of pictures, beside the Gaussians: pictures for people show
   /// it, and nothing else takes it into account.
   Gaussians fill;
 };

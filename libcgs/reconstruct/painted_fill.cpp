@@ -27,6 +27,7 @@ struct Painting {
   PaintedView view;
   RenderBuffers shown;  ///< With what earlier views painted.
   MaskMap open;         ///< 1 = to be filled from this one.
+  DepthMap far_side;    ///< Where the far side of what is open goes on.
   DepthMap depth;       ///< Of what is painted; NaN = nowhere.
 };
 
@@ -37,7 +38,7 @@ Painting painting_of(const Model& model,
                      const Gaussians& earlier,
                      const Camera& camera,
                      ViewFill& report) {
-  Painting out{{camera, {}, {}, {}}, render_camera(model, inputs, camera), {}, {}};
+  Painting out{{camera, {}, {}, {}}, render_camera(model, inputs, camera), {}, {}, {}};
   const RenderBuffers fill = rasterize(earlier, camera);
   out.open = MaskMap(camera.width, camera.height, 0);
   for (size_t i = 0; i < out.open.data.size(); ++i) {
@@ -48,7 +49,8 @@ Painting painting_of(const Model& model,
     out.open.data[i] = is_filled ? 0 : 1;
   }
   out.shown = with_fill(std::move(out.shown), fill);
-  out.depth = hidden_depth(out.shown, out.open);
+  out.far_side = hidden_depth(out.shown, out.open);
+  out.depth = out.far_side;
   return out;
 }
 
@@ -56,34 +58,45 @@ void check_size(const PaintedView& view, const Camera& camera) {
   require(view.picture.width == camera.width && view.picture.height == camera.height,
           "a painted picture must be of the size of its camera; its width",
           view.picture.width);
+  const MaskMap& left_open = view.left_open;
+  require(
+      left_open.empty() || (left_open.width == camera.width && left_open.height == camera.height),
+      "the mask of what was not painted must be of the size of the camera; its width",
+      left_open.width);
 }
 
-void take_view(PaintedView view, Painting& painting) {
+bool is_left_open(const Painting& painting, size_t pixel) {
+  const MaskMap& left_open = painting.view.left_open;
+  return !left_open.empty() && left_open.data[pixel] != 0;
+}
+
+void take_view(PaintedView view, Painting& painting, ViewFill& report) {
   check_size(view, painting.view.camera);
-  for (size_t i = 0; i < view.left_open.data.size(); ++i) {
-    if (view.left_open.data[i] == 0) continue;
-    painting.open.data[i] = 0;
-    painting.depth.data[i] = kNaN;
-  }
+  view.camera = painting.view.camera;
   painting.view = std::move(view);
+  for (size_t i = 0; i < painting.open.data.size(); ++i) {
+    if (painting.open.data[i] == 0) continue;
+    if (is_left_open(painting, i)) {
+      painting.open.data[i] = 0;
+      painting.depth.data[i] = kNaN;
+      ++report.left_open;
+      continue;
+    }
+    report.unplaced += std::isnan(painting.depth.data[i]) ? 1 : 0;
+    report.moved_back += painting.depth.data[i] > painting.far_side.data[i] ? 1 : 0;
+  }
 }
 
-// Moves painted pixels out of the way of input views.
-void clear_sights(const std::vector<SupportView>& inputs, Painting& painting, ViewFill& report) {
+// Moves what is to be painted out of the way of input views.
+void clear_sights(const std::vector<SupportView>& inputs, Painting& painting) {
   const Camera& camera = painting.view.camera;
   DepthMap& depth = painting.depth;
-  const DepthMap before = depth;
   tbb::parallel_for(0, depth.height, [&](int y) {
     for (int x = 0; x < depth.width; ++x) {
       if (painting.open(x, y) == 0 || std::isnan(depth(x, y))) continue;
       depth(x, y) = hidden_from_all(inputs, camera, x, y, depth(x, y));
     }
   });
-  for (size_t i = 0; i < depth.data.size(); ++i) {
-    if (painting.open.data[i] == 0) continue;
-    report.unplaced += std::isnan(depth.data[i]) ? 1 : 0;
-    report.moved_back += depth.data[i] > before.data[i] ? 1 : 0;
-  }
 }
 
 // By how much a painted pixel beside a seam differs from the far side next to it; nothing where it
@@ -98,6 +111,7 @@ std::optional<Eigen::Vector3f> seam_offset(const Painting& painting,
     const int u = x + dx;
     const int v = y + dy;
     if (!around.contains(u, v) || painting.open(u, v) != 0) continue;
+    if (is_left_open(painting, around.index(u, v))) continue;
     const float there = painting.shown.median_depth(u, v);
     const float here = painting.depth(x, y);
     const bool goes_on = there >= kFarSide * here && here >= kFarSide * there;
@@ -231,9 +245,9 @@ PaintedFill lift_painted(const Model& model,
     report(progress, double(k) / double(cameras.size()));
     ViewFill& told = out.views.emplace_back();
     Painting painting = painting_of(model, inputs, out.gaussians, cameras[k], told);
-    take_view(paint(k, {cameras[k], inputs, painting.shown, painting.open, painting.depth}),
-              painting);
-    clear_sights(inputs, painting, told);
+    clear_sights(inputs, painting);
+    const ViewToPaint to_paint{cameras[k], inputs, painting.shown, painting.open, painting.depth};
+    take_view(paint(k, to_paint), painting, told);
     const size_t before = out.gaussians.size();
     append(out.gaussians, discs_of(painting, without_seams(painting)));
     told.lifted = out.gaussians.size() - before;

@@ -14,7 +14,7 @@
 
 namespace cgs {
 
-/// A picture of a model in whose holes somebody painted.
+/// A picture of a model in whose holes something was painted.
 struct PaintedView {
   Camera camera;       ///< [internal units]
   ColorImage picture;  ///< Of the size of the camera.
@@ -28,16 +28,18 @@ struct ViewToPaint {
   const std::vector<SupportView>& inputs;  ///< Of the model.
   const RenderBuffers& shown;  ///< The model as seen from there, with what was painted before.
   const MaskMap& open;         ///< 1 = a hole to be painted.
-  const DepthMap& hidden;      ///< hidden_depth() of these.
+  const DepthMap& hidden;      ///< Where what is painted will lie; NaN = nowhere.
 };
 
-/// Paints the view at a position in the list of cameras.
+/// Paints the view at a position in the list of cameras. The camera of what it returns is not
+/// looked at.
 using HolePainter = std::function<PaintedView(size_t, const ViewToPaint&)>;
 
 /// What became of the holes of a painted view [pixels].
 struct ViewFill {
   size_t holes = 0;          ///< All of them.
   size_t filled_before = 0;  ///< Shown by what an earlier view painted: the first wins.
+  size_t left_open = 0;      ///< Not painted.
   size_t lifted = 0;         ///< Became a Gaussian.
   size_t moved_back = 0;     ///< Of these, so that it stands in no input view's way.
   size_t unplaced = 0;       ///< Stay open: nowhere on their ray are they hidden from all inputs.

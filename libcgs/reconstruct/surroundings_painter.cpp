@@ -16,7 +16,7 @@ namespace cgs {
 
 namespace {
 
-/// The shown pixel next to a hole, by steps from pixel to pixel.
+/// The pixel next to a hole that an input view shows, by steps from pixel to pixel.
 struct NextShown {
   int distance = 0;  // [pixels]; < 0 = there is none
   bool is_sky = false;
@@ -28,7 +28,7 @@ Raster<NextShown> next_shown(const ViewToPaint& view) {
   std::vector<std::pair<int, int>> reached;
   for (int y = 0; y < open.height; ++y) {
     for (int x = 0; x < open.width; ++x) {
-      if (open(x, y) != 0) continue;
+      if (is_hole(view.shown.hole(x, y))) continue;
       out(x, y) = {0, view.shown.hole(x, y) == Hole::Sky};
       reached.emplace_back(x, y);
     }
@@ -64,7 +64,8 @@ MaskMap holes_left_open(const ViewToPaint& view) {
     for (int x = 0; x < out.width; ++x) {
       if (view.open(x, y) == 0) continue;
       const NextShown& shown = next(x, y);
-      const bool is_far = shown.distance < 0 || kWidths * shown.distance > out.width;
+      const bool is_nowhere = std::isnan(view.hidden(x, y));
+      const bool is_far = is_nowhere || shown.distance < 0 || kWidths * shown.distance > out.width;
       if (is_far || shown.is_sky || is_looked_at(view, x, y)) out(x, y) = 1;
     }
   });

@@ -15,9 +15,10 @@ struct PaintedSurroundings {
 /// Paints the holes of a view with pieces of what is shown around them: exemplar_fill() by depth.
 ///
 /// Left open are holes of which other things are known, or too little: what an input view looks at
-/// without knowing a surface there, for its photograph shows something else, or sky; holes in the
-/// sky, by the shown pixel next to them, where what is painted would stand in the air; and what
-/// lies farther than a twelfth of the picture's width from anything that is shown.
+/// without knowing a surface there, as its photograph shows something else, or sky, or a mask
+/// leaves it out; holes in the sky, by the shown pixel next to them, where what is painted would
+/// stand in the air; and what lies farther than a twelfth of the picture's width from anything that
+/// an input view shows.
 PaintedSurroundings painted_surroundings(const ViewToPaint& view);
 
 }  // namespace cgs

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include <tbb/parallel_for.h>
@@ -75,7 +74,7 @@ Level halved(const Level& fine) {
       int count = 0;
       for (int k = 0; k < kHalf * kHalf; ++k) {
         const size_t i = fine.open.index(kHalf * x + k % kHalf, kHalf * y + k / kHalf);
-        if (fine.open.data[i] != out.open(x, y)) continue;
+        if ((fine.open.data[i] != 0) != (out.open(x, y) != 0)) continue;
         color += fine.color.data[i];
         depth += fine.depth.data[i];  // NaN, too
         ++count;
@@ -131,18 +130,17 @@ class Filling {
     const float scale = typical_cost();
     ColorImage out = level_.color;
     for_open([&](int x, int y) {
+      float least = kNoMatch;
+      for_window(x, y, reach, [&](int, int, const Match& m) { least = std::min(least, m.cost); });
+      if (least == kNoMatch) return;
       Eigen::Vector3f sum = Eigen::Vector3f::Zero();
       float weight = 0;
-      for (int v = std::max(0, y - reach); v <= std::min(out.height - 1, y + reach); ++v) {
-        for (int u = std::max(0, x - reach); u <= std::min(out.width - 1, x + reach); ++u) {
-          const Match& match = matches_(u, v);
-          if (match.x < 0) continue;
-          const float w = std::exp(-match.cost / scale);
-          sum += w * level_.color(match.x + x - u, match.y + y - v);
-          weight += w;
-        }
-      }
-      if (weight > 0) out(x, y) = sum / weight;
+      for_window(x, y, reach, [&](int u, int v, const Match& match) {
+        const float w = std::exp((least - match.cost) / scale);
+        sum += w * level_.color(match.x + x - u, match.y + y - v);
+        weight += w;
+      });
+      out(x, y) = sum / weight;
     });
     level_.color = std::move(out);
   }
@@ -159,6 +157,16 @@ class Filling {
         if (level_.open(x, y) != 0) visit(x, y);
       }
     });
+  }
+
+  // Calls visit(u, v, match) for the pixels around one that have a match.
+  template <typename Visit>
+  void for_window(int x, int y, int reach, const Visit& visit) const {
+    for (int v = std::max(0, y - reach); v <= std::min(matches_.height - 1, y + reach); ++v) {
+      for (int u = std::max(0, x - reach); u <= std::min(matches_.width - 1, x + reach); ++u) {
+        if (matches_(u, v).x >= 0) visit(u, v, matches_(u, v));
+      }
+    }
   }
 
   // Whether a piece may be taken for a window of a gap.
@@ -178,7 +186,8 @@ class Filling {
         const int v = y + dy;
         if (!level_.open.contains(u, v)) continue;
         // What stands in front of the gap is no part of what it hides.
-        if (level_.open(u, v) == 0 && level_.depth(u, v) < kFarSide * hidden) continue;
+        const float depth = level_.depth(u, v);
+        if (level_.open(u, v) == 0 && (depth == 0 || depth < kFarSide * hidden)) continue;
         sum += (level_.color(u, v) - level_.color(from_x + dx, from_y + dy)).squaredNorm();
         ++count;
       }
@@ -221,7 +230,8 @@ class Filling {
     }
   }
 
-  // Cost up to which windows speak in full: that of three quarters of them.
+  // By how much more a window may cost than the best one and still have a say: what three quarters
+  // of them cost.
   float typical_cost() const {
     std::vector<float> costs;
     for (const Match& match : matches_.data) {
@@ -278,7 +288,10 @@ ColorImage exemplar_fill(const ColorImage& picture, const MaskMap& open, const D
   for (size_t k = levels.size(); k-- > 0;) {
     Level& level = levels[k];
     Filling filling(level);
-    if (!filling.has_pieces()) continue;
+    if (!filling.has_pieces()) {
+      found = {};
+      continue;
+    }
     const bool is_coarsest = found.empty();
     filling.begin(found);
     // What was found at half the size says more than the colours to begin with.

@@ -14,7 +14,7 @@ namespace cgs {
 /// \param open     1 = in a gap
 /// \param depth    outside of gaps of what is shown, NaN where no piece may come from (unknown, or
 ///                 sky), 0 where nothing is shown that a gap could go on with; in gaps of what they
-///                 hide, NaN where any piece will do [any unit]
+///                 hide [any unit]
 /// \return the picture with painted gaps; where no piece is far enough, as it began. The same bits
 ///         for any number of threads: random numbers are those of their index
 /// Source: Wexler et al. 2007, "Space-Time Completion of Video", eq. 4 and 5, coarse to fine;

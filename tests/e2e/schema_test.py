@@ -251,6 +251,7 @@ def painted_holes():
     write_png(path, width, height, 2, rows)
     told = cgs("fill", "trained", "holes", "-o", "filled")
     assert told["views"][0]["lifted"] and told["splats"]
+    assert cgs("fill", "trained", "-o", "filled_by_itself")["views"][0]["file"] == "surroundings/hole_1.png"
     assert cgs("render", "filled", "--path", "holes/cameras.json", "-o", "shown")[0]["synthetic_fraction"] > 0
     assert cgs("render", "filled", "--views", "view_04", "-o", "shown_view")[0]["synthetic_fraction"] >= 0
     assert cgs("convert", "filled", "painted.ply")["output"]["synthetic"]["splats"]

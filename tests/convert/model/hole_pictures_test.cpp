@@ -130,7 +130,7 @@ TEST_F(HolePicturesTest, FilledModelKeepsTheBytesOfItsEvidence) {
   write_png(file(".png"), painted());
   const PaintedFill fill = lift_painted(model_, read().views);
   ASSERT_GT(fill.gaussians.size(), 0u);
-  write_filled_model(dir_ / "model", model_, fill.gaussians, dir_ / "filled");
+  write_filled_model(dir_ / "model", model_, fill.gaussians, {}, dir_ / "filled");
   for (const char* const name : {"gaussians.ply", "cameras.json", "priors/v1.exr"}) {
     EXPECT_EQ(test::read_bytes(dir_ / "model" / name), test::read_bytes(dir_ / "filled" / name));
   }

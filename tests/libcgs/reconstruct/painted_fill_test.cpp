@@ -65,6 +65,55 @@ TEST(PaintedFill, IsTaggedAndLabelledAsMadeUp) {
   for (const Provenance label : fill.provenance) EXPECT_EQ(label, Provenance::Inferred);
 }
 
+TEST(PaintedFill, HasNothingWhereAViewWasLeftOpen) {
+  const Model model = panel_model();
+  PaintedView view = painted_at(model, kAside, kPaint);
+  const ViewFill all = lift_painted(model, {view}).views[0];
+  view.left_open = MaskMap(view.camera.width, view.camera.height, 0);
+  for (int y = 0; y < view.camera.height / 2; ++y) {
+    for (int x = 0; x < view.camera.width; ++x) view.left_open(x, y) = 1;
+  }
+  const PaintedFill fill = lift_painted(model, {view});
+  const ViewFill& told = fill.views[0];
+  EXPECT_EQ(told.holes, all.holes);
+  EXPECT_GT(told.left_open, 100u);
+  EXPECT_EQ(told.lifted + told.left_open + told.unplaced + told.shone_through, told.holes);
+  EXPECT_GT(told.lifted, 100u);
+  for (const Eigen::Vector3f& p : fill.gaussians.position) {
+    EXPECT_GE(view.camera.project(p.cast<double>()).y(), double(view.camera.height) / 2);
+  }
+  view.left_open = MaskMap(3, 3, 1);
+  EXPECT_THROW(lift_painted(model, {view}), InvalidInput);
+}
+
+// Each view is painted by one who sees what was painted before.
+TEST(PaintedFill, ShowsAPainterWhatWasPaintedBefore) {
+  const Model model = panel_model();
+  const std::vector<Camera> cameras(2, panel_camera(kAside));
+  std::vector<size_t> open;
+  std::vector<Eigen::Vector3f> middle;
+  const auto paint = [&](size_t k, const ViewToPaint& view) {
+    PaintedView out = painted_at(model, kAside, kPaint);
+    open.push_back(
+        static_cast<size_t>(std::count(view.open.data.begin(), view.open.data.end(), 1)));
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    float count = 0;
+    for (size_t i = 0; i < view.open.data.size(); ++i) {
+      if (!is_hole(view.shown.hole.data[i]) || view.open.data[i] != 0) continue;
+      sum += picture(view.shown).data[i];
+      ++count;
+    }
+    middle.push_back(count > 0 ? Eigen::Vector3f(sum / count) : sum);
+    EXPECT_EQ(&view.camera, &cameras[k]);
+    return out;
+  };
+  const PaintedFill fill = lift_painted(model, cameras, paint);
+  ASSERT_EQ(open.size(), 2u);
+  EXPECT_LT(double(open[1]), 0.3 * double(open[0]));
+  EXPECT_EQ(fill.views[1].filled_before, fill.views[1].holes - open[1]);
+  EXPECT_GT(middle[1].y(), middle[1].x());  // of the paint
+}
+
 // The oracle looks at depth as the photographs state it, not at what is rendered.
 TEST(PaintedFill, StandsBeforeNothingThatAPhotographShows) {
   const Model model = panel_model();

@@ -2,6 +2,7 @@
 #include "libcgs/render/exemplar_fill.h"
 
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -12,8 +13,8 @@
 namespace cgs::exemplar_fill_test {
 namespace {
 
-constexpr int kWidth = 120;
-constexpr int kHeight = 90;
+constexpr int kWidth = 181;  // so that halved pictures lose a row and a column
+constexpr int kHeight = 151;
 constexpr float kWall = 5;
 constexpr float kPanel = 3;
 
@@ -67,9 +68,8 @@ TEST(ExemplarFill, GoesOnWithTheBricksAroundAGap) {
   EXPECT_LT(after, 0.05);
 }
 
-// Of an odd size, so that halved pictures lose a row and a column.
 TEST(ExemplarFill, GoesOnToTheBorderOfThePicture) {
-  const Gapped scene = wall_with_gap(95, kWidth, 0, kHeight);
+  const Gapped scene = wall_with_gap(kWidth - 25, kWidth, 0, kHeight);
   EXPECT_LT(error_in_gap(scene, exemplar_fill(scene.picture, scene.open, scene.depth)), 0.12);
 }
 
@@ -97,6 +97,29 @@ TEST(ExemplarFill, TakesNothingOfWhatStandsBeforeTheGap) {
   EXPECT_LT(error_in_gap(scene, painted), 0.15);
 }
 
+// Most of what is to be painted is of one colour, and costs nothing.
+TEST(ExemplarFill, PaintsTextureBesideALargeEvenGap) {
+  Gapped scene = wall_with_gap(10, 40, 100, 120);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> gray(0, 1);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const bool is_even = y < 80;
+      scene.whole(x, y) = Eigen::Vector3f::Constant(is_even ? 0.3f : gray(random));
+      const bool is_gap = scene.open(x, y) != 0 || (is_even && x > 60 && y > 10 && y < 70);
+      scene.open(x, y) = is_gap ? 1 : 0;
+      scene.picture(x, y) = is_gap ? Eigen::Vector3f(0.3f, 0.3f, 0.35f) : scene.whole(x, y);
+    }
+  }
+  const ColorImage painted = exemplar_fill(scene.picture, scene.open, scene.depth);
+  double spread = 0;
+  for (int y = 100; y < 120; ++y) {
+    for (int x = 10; x < 40; ++x) spread += std::abs(double(painted(x, y).x()) - 0.5) / 600;
+  }
+  EXPECT_GT(spread, 0.1);  // grays as around it, a quarter from their mean; not the blur
+  EXPECT_NEAR(painted(25, 110).x(), painted(25, 110).z(), 1e-6f);
+}
+
 TEST(ExemplarFill, LeavesColoursWhereNoPieceIsFarEnough) {
   Gapped scene = wall_with_gap(45, 75, 30, 60);
   for (size_t i = 0; i < scene.depth.data.size(); ++i) {
@@ -107,10 +130,11 @@ TEST(ExemplarFill, LeavesColoursWhereNoPieceIsFarEnough) {
   EXPECT_EQ(exemplar_fill(scene.picture, scene.open, scene.depth).data, scene.picture.data);
 }
 
-TEST(ExemplarFill, PaintsPicturesSmallerThanAWindow) {
-  const ColorImage picture(5, 4, Eigen::Vector3f::Constant(0.5f));
+TEST(ExemplarFill, LeavesPicturesSmallerThanAWindow) {
+  ColorImage picture(5, 4, Eigen::Vector3f::Constant(0.5f));
   MaskMap open(5, 4, 0);
   open(2, 2) = 1;
+  picture(2, 2) = {1, 0, 0};
   EXPECT_EQ(exemplar_fill(picture, open, DepthMap(5, 4, kWall)).data, picture.data);
 }
 
