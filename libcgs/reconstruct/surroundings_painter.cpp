@@ -56,6 +56,32 @@ bool is_looked_at(const ViewToPaint& view, int x, int y) {
   });
 }
 
+// Leaves connected gaps open as a whole if half or more of them is set: a rest that is painted
+// would be slivers in the middle of what a photograph looks at.
+void spread_over_gaps(const MaskMap& open, MaskMap& left_open) {
+  MaskMap reached(open.width, open.height, 0);
+  std::vector<std::pair<int, int>> gap;
+  for (int start = 0; start < static_cast<int>(open.data.size()); ++start) {
+    gap.clear();
+    const auto reach = [&](int x, int y) {
+      if (!open.contains(x, y) || open(x, y) == 0 || reached(x, y) != 0) return;
+      reached(x, y) = 1;
+      gap.emplace_back(x, y);
+    };
+    reach(start % open.width, start / open.width);
+    size_t set = 0;
+    for (size_t i = 0; i < gap.size(); ++i) {
+      const auto [x, y] = gap[i];
+      set += left_open(x, y);
+      for (const auto& [dx, dy] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}}) {
+        reach(x + dx, y + dy);
+      }
+    }
+    if (2 * set < gap.size()) continue;
+    for (const auto& [x, y] : gap) left_open(x, y) = 1;
+  }
+}
+
 MaskMap holes_left_open(const ViewToPaint& view) {
   constexpr int kWidths = 12;
   const Raster<NextShown> next = next_shown(view);
@@ -63,12 +89,16 @@ MaskMap holes_left_open(const ViewToPaint& view) {
   tbb::parallel_for(0, out.height, [&](int y) {
     for (int x = 0; x < out.width; ++x) {
       if (view.open(x, y) == 0) continue;
-      const NextShown& shown = next(x, y);
       const bool is_nowhere = std::isnan(view.hidden(x, y));
-      const bool is_far = is_nowhere || shown.distance < 0 || kWidths * shown.distance > out.width;
-      if (is_far || shown.is_sky || is_looked_at(view, x, y)) out(x, y) = 1;
+      if (is_nowhere || next(x, y).is_sky || is_looked_at(view, x, y)) out(x, y) = 1;
     }
   });
+  spread_over_gaps(view.open, out);
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    const int distance = next.data[i].distance;
+    const bool is_far = distance < 0 || kWidths * distance > out.width;
+    if (is_far && view.open.data[i] != 0) out.data[i] = 1;
+  }
   return out;
 }
 

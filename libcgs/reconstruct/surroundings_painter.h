@@ -17,8 +17,8 @@ struct PaintedSurroundings {
 /// Left open are holes of which other things are known, or too little: what an input view looks at
 /// without knowing a surface there, as its photograph shows something else, or sky, or a mask
 /// leaves it out; holes in the sky, by the shown pixel next to them, where what is painted would
-/// stand in the air; and what lies farther than a twelfth of the picture's width from anything that
-/// an input view shows.
+/// stand in the air; all of a gap of which these are half; and what lies farther than a twelfth of
+/// the picture's width from anything that an input view shows.
 PaintedSurroundings painted_surroundings(const ViewToPaint& view);
 
 }  // namespace cgs

@@ -21,7 +21,8 @@ from pathlib import Path
 
 import real_run
 
-COLORS = ["#1f6fb5", "#c2571a", "#2c8a4b", "#8a4bb0", "#b8860b", "#5b6670", "#c23b63", "#12848c"]
+COLORS = ["#1f6fb5", "#c2571a", "#2c8a4b", "#8a4bb0", "#b8860b", "#5b6670", "#c23b63", "#12848c",
+          "#7f3f00", "#000000", "#9aa50f", "#4d5cff"]
 LEAST = 0.5  # [processor seconds] stages below it at the largest size are left out
 
 
@@ -99,9 +100,10 @@ def main():
         print(f"# {divisor}: {runs[-1]['all'][0]:.0f} s", file=sys.stderr)
     curves = {}
     for name in runs[-1]:
-        curve = [processor_seconds(run).get(name, 0.0) for run in runs]
-        if curve[-1] >= LEAST:
-            curves[name] = curve
+        if all(name in run for run in runs):
+            curve = [processor_seconds(run)[name] for run in runs]
+            if curve[-1] >= LEAST:
+                curves[name] = curve
     print("| | " + " | ".join(f"{size:.2f}" for size in sizes) + " megapixels | power |")
     print("|---" * (len(sizes) + 2) + "|")
     for name, curve in curves.items():
@@ -115,8 +117,7 @@ def main():
     alone = real_run.stages_of(
         program, scene, [*options, "--downscale", str(divisors[middle]), "--threads", "1"])
     print(f"\nat {sizes[middle]:.2f} megapixels, one thread over all: " + ", ".join(
-        f"{name} {alone[name][0] / runs[middle][name][0]:.2f}"
-        for name in curves if name in alone and name in runs[middle]))
+        f"{name} {alone[name][0] / runs[middle][name][0]:.2f}" for name in curves if name in alone))
 
 
 if __name__ == "__main__":
