@@ -70,16 +70,6 @@ double cost_of_source(const SweepImage& reference,
     const Vector3d h = source.project(i + 0.5, j + 0.5, t);
     return std::pair(double(reference.gray(i, j)), gray_at(image, h.x() / h.z(), h.y() / h.z()));
   };
-  // Census compares 64ths of a gray level; 112 of them are noise.
-  const auto level = [](double gray) { return std::floor(gray * 64 + 1e-3); };
-  const auto [center_a, center_b] = both(0, 0);
-  int differing = 0;
-  for (int dy = -3; dy <= 3; ++dy) {
-    for (int dx = -3; dx <= 3; ++dx) {
-      const auto [a, b] = both(dx, dy);
-      differing += (level(a) > level(center_a) + 112) != (level(b) > level(center_b) + 112);
-    }
-  }
   double mean_a = 0, mean_b = 0, aa = 0, bb = 0, ab = 0;
   for (int dy = -2; dy <= 2; ++dy) {
     for (int dx = -2; dx <= 2; ++dx) {
@@ -94,6 +84,18 @@ double cost_of_source(const SweepImage& reference,
       aa += (a - mean_a) * (a - mean_a) / 25;
       bb += (b - mean_b) * (b - mean_b) / 25;
       ab += (a - mean_a) * (b - mean_b) / 25;
+    }
+  }
+  // Census compares 64ths of a gray level; where the reference varies by less than 3 levels, 112 of
+  // them are noise.
+  const auto level = [](double gray) { return std::floor(gray * 64 + 1e-3); };
+  const double noise = aa < 9 ? 112 : 0;
+  const auto [center_a, center_b] = both(0, 0);
+  int differing = 0;
+  for (int dy = -3; dy <= 3; ++dy) {
+    for (int dx = -3; dx <= 3; ++dx) {
+      const auto [a, b] = both(dx, dy);
+      differing += (level(a) > level(center_a) + noise) != (level(b) > level(center_b) + noise);
     }
   }
   return 0.6 * differing / 48 + 0.4 * 0.5 * (1 - ab / std::sqrt((aa + 4) * (bb + 4)));

@@ -8,6 +8,8 @@
 
 #include "libcgs/core/nan.h"
 #include "libcgs/render/hidden_depth.h"
+#include "libcgs/render/picture.h"
+#include "libcgs/render/rasterizer.h"
 #include "tests/support/panel_model.h"
 
 namespace cgs::surroundings_painter_test {
@@ -63,6 +65,30 @@ TEST(SurroundingsPainter, PaintsTheWallBehindThePanel) {
       ASSERT_LT((aside.painted.picture(x, y) - wall).norm(), 0.25f) << x << ", " << y;
     }
   }
+}
+
+TEST(SurroundingsPainter, CoversTheBandBehindThePanelAndNothingElse) {
+  const Model model = panel_model();
+  const Camera camera = panel_camera(kAside);
+  const RenderBuffers before = render_camera(model, support_views(model), camera);
+  MaskMap painted(camera.width, camera.height, 0);
+  const PaintedFill made = lift_painted(model, {camera}, [&](size_t, const ViewToPaint& view) {
+    PaintedSurroundings out = painted_surroundings(view);
+    for (size_t i = 0; i < painted.data.size(); ++i) {
+      painted.data[i] = view.open.data[i] != 0 && out.left_open.data[i] == 0 ? 1 : 0;
+    }
+    return PaintedView{camera, out.picture, {"hole_1.png", "ab"}, out.left_open};
+  });
+  const RenderBuffers after = with_fill(before, rasterize(made.gaussians, camera));
+  size_t covered = 0;
+  size_t band = 0;
+  for (size_t i = 0; i < painted.data.size(); ++i) {
+    band += painted.data[i];
+    covered += painted.data[i] != 0 && after.alpha.data[i] > 0.95f ? 1 : 0;
+    if (!is_hole(before.hole.data[i])) ASSERT_EQ(after.color.data[i], before.color.data[i]);
+  }
+  EXPECT_GT(band, 200u);
+  EXPECT_GT(double(covered), 0.95 * double(band));
 }
 
 TEST(SurroundingsPainter, LeavesOpenWhatIsFarFromAllThatIsShown) {
