@@ -120,8 +120,7 @@ TEST(MaxSize, IsKeptWithTheDeviationStated) {
   const auto whole = fs::file_size(asset);
   const std::vector<Triangle> fused = fused_triangles(out, dir / "fused");
   double finer = 0;
-  for (const double part :
-       {1.5, 0.8, 0.7}) {  // two thirds is the least that so small a scene takes
+  for (const double part : {1.5, 0.8, 0.65}) {
     const auto limit = static_cast<size_t>(part * double(whole));
     const auto run = run_cgs(run_arguments(dir, "out") + " -w --max-size " + std::to_string(limit));
     ASSERT_EQ(run.exit_code, 0) << run.err;
