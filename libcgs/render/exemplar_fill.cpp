@@ -10,6 +10,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/nan.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/split_mix.h"
 #include "libcgs/render/hidden_depth.h"
 
@@ -35,11 +36,6 @@ struct Level {
   DepthMap depth;
   DepthMap nearest;  // of the window around a pixel; NaN = no piece may come from there
 };
-
-bool is_whole(const Level& level, int x, int y) {
-  return x >= kRadius && y >= kRadius && x < level.color.width - kRadius &&
-         y < level.color.height - kRadius;
-}
 
 void find_pieces(Level& level) {
   level.nearest = DepthMap(level.color.width, level.color.height, kNaN);
@@ -198,7 +194,7 @@ class Filling {
   }
 
   void consider(int x, int y, int from_x, int from_y) {
-    if (!is_whole(level_, from_x, from_y) || !is_behind(x, y, from_x, from_y)) return;
+    if (!level_.nearest.contains(from_x, from_y) || !is_behind(x, y, from_x, from_y)) return;
     Match& best = matches_(x, y);
     const float c = cost(x, y, from_x, from_y, best.cost);
     if (c < best.cost) best = {from_x, from_y, c};
@@ -239,9 +235,7 @@ class Filling {
     }
     constexpr float kLeast = 1e-5f;
     if (costs.empty()) return kLeast;
-    const auto at = costs.begin() + static_cast<std::ptrdiff_t>(costs.size() * 3 / 4);
-    std::nth_element(costs.begin(), at, costs.end());
-    return std::max(*at, kLeast);
+    return std::max(nth_smallest(costs, costs.size() * 3 / 4), kLeast);
   }
 
   Level& level_;
@@ -249,28 +243,29 @@ class Filling {
   Raster<Match> matches_;
 };
 
+// Whether a pixel has a window of which nothing is known.
+bool has_wide_gap(const MaskMap& open) {
+  for (int y = 0; y < open.height; ++y) {
+    for (int x = 0; x < open.width; ++x) {
+      bool is_open = true;
+      for (int v = std::max(0, y - kRadius); is_open && v <= y + kRadius; ++v) {
+        for (int u = std::max(0, x - kRadius); is_open && u <= x + kRadius; ++u) {
+          is_open = !open.contains(u, v) || open(u, v) != 0;
+        }
+      }
+      if (is_open) return true;
+    }
+  }
+  return false;
+}
+
 // Sizes from the given one down to where gaps are a window wide or the picture is a few of them.
 std::vector<Level> levels_of(Level finest) {
   constexpr int kLeastSide = 12 * kRadius;
   find_pieces(finest);
   std::vector<Level> out = {std::move(finest)};
-  const auto is_wide = [](const Level& level) {
-    // A pixel from whose window nothing is known.
-    for (int y = 0; y < level.open.height; ++y) {
-      for (int x = 0; x < level.open.width; ++x) {
-        bool is_open = true;
-        for (int v = std::max(0, y - kRadius); is_open && v <= y + kRadius; ++v) {
-          for (int u = std::max(0, x - kRadius); is_open && u <= x + kRadius; ++u) {
-            is_open = !level.open.contains(u, v) || level.open(u, v) != 0;
-          }
-        }
-        if (is_open) return true;
-      }
-    }
-    return false;
-  };
   while (std::min(out.back().color.width, out.back().color.height) >= 2 * kLeastSide &&
-         is_wide(out.back())) {
+         has_wide_gap(out.back().open)) {
     out.push_back(halved(out.back()));
   }
   return out;
