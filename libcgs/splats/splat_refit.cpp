@@ -22,7 +22,8 @@ constexpr float kScaleRate = 0.09f;     // of the logarithm
 constexpr float kPositionRate = 0.03f;  // [pixels]
 
 constexpr float kLeastOpacity = 0.002f;
-constexpr float kSmallest = 0.05f;  // scales [pixels]
+constexpr float kSmallest = 0.05f;   // scales [pixels]
+constexpr float kMostGrowth = 1.2f;  // of scales
 
 // What Adam changes; of each splat one opacity, and three of everything else.
 struct Parameters {
@@ -44,6 +45,7 @@ class Refit {
   Gaussians& g_;
   const std::vector<float>& pixel_;
   const std::vector<Eigen::Vector3f> start_;  // centres
+  std::vector<float> most_scale_;             // logarithms, as the parameters
   TrainingRasterizer rasterizer_;
   GaussianGradients gradients_;  // of one step; kept for its memory
   Parameters p_;
@@ -68,6 +70,8 @@ Refit::Refit(Gaussians& gaussians, const std::vector<float>& pixel)
       p_.scale.value[3 * i + k] = std::log(std::max(g_.scale[i][axis], kSmallest * pixel_[i]));
     }
   }
+  most_scale_ = p_.scale.value;
+  for (float& most : most_scale_) most += std::log(kMostGrowth);
 }
 
 TrainingBuffers Refit::differences(const PictureToMatch& picture) {
@@ -113,7 +117,9 @@ void Refit::decode() {
     for (size_t k = 0; k < 3; ++k) {
       const auto axis = static_cast<Eigen::Index>(k);
       g_.sh[i * harmonics][axis] = p_.color.value[3 * i + k] / kShC0;
-      g_.scale[i][axis] = std::max(std::exp(p_.scale.value[3 * i + k]), kSmallest * pixel_[i]);
+      float& scale = p_.scale.value[3 * i + k];
+      scale = std::min(scale, most_scale_[3 * i + k]);
+      g_.scale[i][axis] = std::max(std::exp(scale), kSmallest * pixel_[i]);
       g_.position[i][axis] = start_[i][axis] + p_.position.value[3 * i + k] * pixel_[i];
     }
   });

@@ -31,8 +31,10 @@ double mean_square_difference(const PictureToMatch& a, const PictureToMatch& b);
 
 /// Changes splats a little so that they look more like given pictures: opacity, constant colour,
 /// scales and centres, by `passes` steps of Adam on the squared differences on black and on white,
-/// of all pixels, one picture after the other. Centres go by parts of pixels; rotations stay. Same
-/// bits for any number of threads.
+/// of all pixels, one picture after the other. Centres go by parts of pixels; rotations stay.
+/// Scales grow by at most a fifth: what the pictures show from its end could grow along their rays
+/// at no cost, and would be a veil to a camera that comes nearer. Same bits for any number of
+/// threads.
 ///
 /// \param pixel  as WeighedSplats has it
 /// \throws Error as TrainingRasterizer::forward(); what `progress` throws

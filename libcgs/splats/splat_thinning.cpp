@@ -132,7 +132,7 @@ struct Trials {
 
 // Few splats need more passes than pictures, and these take little of the time: what fits them to
 // the pictures halves what is lost, so that half as many do.
-constexpr size_t kPasses = 96;
+constexpr size_t kPasses = 144;
 constexpr size_t kFirstPasses = 24;  // tell which setting it will be
 constexpr double kMostHelp = 3;      // by which the others divide what is lost, as measured at most
 

@@ -33,9 +33,9 @@ struct ThinnedSplats {
   std::optional<double> unseen_psnr;
 };
 
-/// What may be lost as thin_splats() foresees it [dB]. It foresees more than photographs that were
-/// held out show, by four times or more: where these are, less was reconstructed well than where
-/// input photographs meet, and all splats were trained on each of these.
+/// What may be lost as thin_splats() foresees it [dB], over what splats show. Photographs that were
+/// held out lose less where they lie between the input views, as less was reconstructed well there,
+/// and about as much where they are nearer to what they show.
 inline constexpr double kMostThinningLoss = 0.2;
 
 /// The splats of input views without those that its pictures do not need: merge_splats() and

@@ -74,6 +74,8 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
             0.35 * double(std::filesystem::file_size(all)));
   EXPECT_GE(thinning["held_out"]["psnr"].get<double>(),
             thinning["held_out_of_all"]["psnr"].get<double>() - 0.05);
+  EXPECT_GE(thinning["held_out"]["psnr_seen"].get<double>(),
+            thinning["held_out_of_all"]["psnr_seen"].get<double>() - 0.3);
 }
 
 TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
