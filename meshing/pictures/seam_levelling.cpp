@@ -23,7 +23,8 @@ namespace cgs {
 
 namespace {
 
-constexpr int kPadding = 8;  // [pixels]; as much as files keep around faces
+constexpr int kPadding = 8;        // [pixels]; as much as files keep around faces
+constexpr double kMostLeft = 0.9;  // of the steps, for what is added to be of light
 
 /// An edge between faces of two photographs, and how much brighter the first of them is around its
 /// ends.
@@ -263,12 +264,14 @@ SeamLevelling level_seams(const TriangleMesh& mesh,
   require(pixel > 0 && std::isfinite(pixel), "level_seams: pixel must be > 0", pixel);
   const TextureCorners corners(mesh.faces, texture.of_face, mesh.vertices.size());
   const Eigen::MatrixX3d added = offsets(mesh, texture, corners, seams, pixel, options);
+  const double before = mean_step(seams, corners, Eigen::MatrixX3d::Zero(added.rows(), 3));
+  const double after = mean_step(seams, corners, added);
+  if (after > kMostLeft * before) return {before, before};
   tbb::parallel_for(size_t(0), texture.photographs.size(), [&](size_t i) {
     add_to_photograph(
         mesh, texture, static_cast<int>(i), corners, added, texture.photographs[i].image);
   });
-  const Eigen::MatrixX3d none = Eigen::MatrixX3d::Zero(added.rows(), 3);
-  return {mean_step(seams, corners, none), mean_step(seams, corners, added)};
+  return {before, after};
 }
 
 }  // namespace cgs

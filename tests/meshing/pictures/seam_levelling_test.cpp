@@ -129,6 +129,22 @@ TEST(LevelSeams, BelievesLargeStepsLess) {
   EXPECT_GT(share_mended(0.05f), share_mended(0.6f));
 }
 
+// Texture that lies a little off is one step at one pixel and another at the next.
+TEST(LevelSeams, LeavesPhotographsThatDifferInDetailAlone) {
+  Strip strip = seam_levelling_test::strip(Vector3f::Constant(0.5f), Vector3f::Constant(0.5f));
+  ColorImage& right = strip.texture.photographs[1].image;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) right(x, y).array() += y % 4 < 2 ? 0.05f : -0.045f;
+  }
+  const PhotoTexture before = strip.texture;
+  const SeamLevelling levelled = level_seams(strip.mesh, strip.texture, 1);
+  EXPECT_GT(levelled.step_before, 0.02);
+  EXPECT_EQ(levelled.step_after, levelled.step_before);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(strip.texture.photographs[i].image.data, before.photographs[i].image.data);
+  }
+}
+
 TEST(LevelSeams, BearsAFaceWithoutAreaAndNeighbours) {
   Strip strip = seam_levelling_test::strip(Vector3f::Constant(0.5f), Vector3f::Constant(0.52f));
   const auto first = static_cast<uint32_t>(strip.mesh.vertices.size());
