@@ -20,6 +20,9 @@ constexpr int kZnccRadius = 2;
 constexpr int kBandRows = 32;
 constexpr float kCensusWeight = 0.6f;
 constexpr float kNoiseVariance = 4.0f;  // [gray levels squared]
+constexpr int kLevels = 64;             // of the census, in a gray level
+constexpr int16_t kCensusNoise = 112;   // [levels of the census] a level and three quarters, …
+constexpr float kEvenVariance = 9.0f;   // … in windows that vary by less [gray levels squared]
 constexpr float kUnseen = 1e9f;
 constexpr float kNeutral = 0.5f;  // cost of a plane that no source sees
 
@@ -55,7 +58,7 @@ struct Band {
         gray[start + width - 1 + k] = gray[start + width - 1];
       }
     }
-    for (size_t i = 0; i < gray.size(); ++i) level[i] = static_cast<int16_t>(gray[i] * 64);
+    for (size_t i = 0; i < gray.size(); ++i) level[i] = static_cast<int16_t>(gray[i] * kLevels);
   }
 };
 
@@ -112,15 +115,18 @@ void warp_row(const SweepImage& image,
 }
 
 /// The census of a row: which of the 48 neighbours of a pixel are brighter than it, 16 in a word.
+/// What is `noise` there is not brighter. (By noise alone half of them would be on an even wall,
+/// others in every photograph.)
 class CensusRow {
  public:
   static constexpr int kWords = 3;
 
-  void take(const Band& band, int row, int width) {
+  /// \param noise  per pixel [levels of the census], with room for whole lanes
+  void take(const Band& band, int row, int width, const std::vector<int16_t>& noise) {
     words_.resize(static_cast<size_t>(kWords) * static_cast<size_t>(width));
-    take_word<0>(band, row, width);
-    take_word<1>(band, row, width);
-    take_word<2>(band, row, width);
+    take_word<0>(band, row, width, noise.data());
+    take_word<1>(band, row, width, noise.data());
+    take_word<2>(band, row, width, noise.data());
   }
 
   // The share of bits that differ.
@@ -147,7 +153,7 @@ class CensusRow {
   // Neighbours from 16 * kWord on, row by row and without the pixel itself. The loop over them is
   // unrolled, that over pixels uses all lanes there are.
   template <int kWord>
-  void take_word(const Band& band, int row, int width) {
+  void take_word(const Band& band, int row, int width, const int16_t* noise) {
     constexpr int kSide = 2 * kMargin + 1;
     std::array<const int16_t*, 16> neighbor{};
     for (int k = 0; k < 16; ++k) {
@@ -160,7 +166,7 @@ class CensusRow {
     uint16_t* out = words_.data() + static_cast<size_t>(kWord) * static_cast<size_t>(width);
     for (int x = 0; x < width; x += kShortLanes) {
       x = std::min(x, std::max(width - kShortLanes, 0));  // the last ones overlap those before
-      const auto middle = load<Shorts>(center + x);
+      const auto middle = load<Shorts>(center + x) + load<Shorts>(noise + x);
       Shorts word{};
       for (const int16_t* from : neighbor) word += word - (load<Shorts>(from + x) > middle);
       store_first(word, width, out + x);
@@ -193,9 +199,11 @@ struct BoxSums {
 constexpr float kZnccArea = (2 * kZnccRadius + 1) * (2 * kZnccRadius + 1);
 constexpr float kMiddleGray = 128;  // smaller sums of squares round less
 
-/// Of the reference, for all planes: mean and variance of the window of each pixel of a row.
+/// Of the reference, for all planes: mean and variance of the window of each pixel of a row, and
+/// what is noise in it.
 struct WindowMoments {
   std::vector<float> mean, variance;
+  std::vector<int16_t> noise;  // as CensusRow takes it
 
   void take(const Band& band, int row, int width) {
     BoxSums a;
@@ -211,11 +219,13 @@ struct WindowMoments {
     }
     mean.resize(static_cast<size_t>(width));
     variance.resize(static_cast<size_t>(width));
+    noise.assign(static_cast<size_t>(width) + Band::kRoom, 0);
     for (int x = 0; x < width; ++x) {
       const float m = a.at(x) / kZnccArea;
       mean[static_cast<size_t>(x)] = m;
-      variance[static_cast<size_t>(x)] =
-          std::max(aa.at(x) / kZnccArea - m * m, 0.0f) + kNoiseVariance;
+      const float spread = std::max(aa.at(x) / kZnccArea - m * m, 0.0f);
+      variance[static_cast<size_t>(x)] = spread + kNoiseVariance;
+      if (spread < kEvenVariance) noise[static_cast<size_t>(x)] = kCensusNoise;
     }
   }
 };
@@ -354,8 +364,8 @@ class BandCost {
     }
     fixed_.finish_rows(width_);
     for (int r = 0; r < rows_; ++r) {
-      fixed_census_.emplace_back().take(fixed_, r, width_);
       fixed_moments_.emplace_back().take(fixed_, r, width_);
+      fixed_census_.emplace_back().take(fixed_, r, width_, fixed_moments_.back().noise);
     }
   }
 
@@ -385,7 +395,7 @@ class BandCost {
       for (int r = 0; r < rows_; ++r) {
         const auto row = static_cast<size_t>(r);
         float* out = &costs[s * band + row * static_cast<size_t>(width_)];
-        warped_census_.take(warped_, r, width_);
+        warped_census_.take(warped_, r, width_, fixed_moments_[row].noise);
         warped_census_.compare(fixed_census_[row], width_, out);
         zncc_.add(fixed_moments_[row], fixed_, warped_, r, width_, out);
         const int32_t* seen = seen_row(r);
