@@ -23,6 +23,9 @@ constexpr float kNoiseVariance = 4.0f;  // [gray levels squared]
 constexpr int kLevels = 64;             // of the census, in a gray level
 constexpr int16_t kCensusNoise = 112;   // [levels of the census] a level and three quarters, …
 constexpr float kEvenVariance = 9.0f;   // … in windows that vary by less [gray levels squared]
+// Burnt out or drawn, and no noise: rounding breaks ties between planes there, in each view
+// otherwise, so that views do not agree on any.
+constexpr float kNoVariance = 0.01f;
 constexpr float kUnseen = 1e9f;
 constexpr float kNeutral = 0.5f;  // cost of a plane that no source sees
 
@@ -225,7 +228,8 @@ struct WindowMoments {
       mean[static_cast<size_t>(x)] = m;
       const float spread = std::max(aa.at(x) / kZnccArea - m * m, 0.0f);
       variance[static_cast<size_t>(x)] = spread + kNoiseVariance;
-      if (spread < kEvenVariance) noise[static_cast<size_t>(x)] = kCensusNoise;
+      const bool is_even = spread > kNoVariance && spread < kEvenVariance;
+      if (is_even) noise[static_cast<size_t>(x)] = kCensusNoise;
     }
   }
 };

@@ -54,7 +54,7 @@ struct PlaneFamily {
 /// lies nearer than the nearest plane of the geometry, or behind the farthest, counts as unseen.
 ///
 /// Per source a census transform (7 x 7, robust to lighting, outliers and foreground fattening;
-/// Zabih and Woodfill 1994), to which, where the reference varies by less than 3 of 255 levels,
+/// Zabih and Woodfill 1994), to which, where the reference varies by 0.1 to 3 of 255 levels,
 /// only what is more than 1.75 levels brighter is brighter, plus normalised cross-correlation
 /// (5 x 5, sharper where there is texture). Sources that see a pixel are combined so that one of
 /// them may be occluded.

@@ -86,10 +86,10 @@ double cost_of_source(const SweepImage& reference,
       ab += (a - mean_a) * (b - mean_b) / 25;
     }
   }
-  // Census compares 64ths of a gray level; where the reference varies by less than 3 levels, 112 of
+  // Census compares 64ths of a gray level; where the reference varies by 0.1 to 3 levels, 112 of
   // them are noise.
   const auto level = [](double gray) { return std::floor(gray * 64 + 1e-3); };
-  const double noise = aa < 9 ? 112 : 0;
+  const double noise = aa > 0.01 && aa < 9 ? 112 : 0;
   const auto [center_a, center_b] = both(0, 0);
   int differing = 0;
   for (int dy = -3; dy <= 3; ++dy) {
