@@ -165,9 +165,7 @@ void write_fill(const std::filesystem::path& folder,
                 const Gaussians& fill,
                 const PicturesBeside& pictures,
                 const Frame& frame) {
-  remove_pictures(folder);
-  if (!pictures.empty()) make_output_folder(folder / kSurroundingsFolder);
-  for (const auto& [name, bytes] : pictures) write_file(folder / name, bytes);
+  write_pictures_beside(folder, pictures);
   if (fill.size() == 0) {
     std::filesystem::remove(folder / kFillFile);  // of another model
     return;
@@ -219,6 +217,12 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
   write_fill(folder, model.fill, {}, model.scene.frame);
   write_cameras_json(folder / "cameras.json", model.scene);  // last: by it the scale is told
   for (const std::filesystem::path& file : earlier) std::filesystem::remove(file);
+}
+
+void write_pictures_beside(const std::filesystem::path& folder, const PicturesBeside& pictures) {
+  remove_pictures(folder);
+  if (!pictures.empty()) make_output_folder(folder / kSurroundingsFolder);
+  for (const auto& [name, bytes] : pictures) write_file(folder / name, bytes);
 }
 
 void write_filled_model(const std::filesystem::path& folder,

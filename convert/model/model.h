@@ -30,6 +30,11 @@ void write_model(const std::filesystem::path& folder, const Model& model);
 /// Pictures in the folder of a model: bytes by their names within.
 using PicturesBeside = std::map<std::string, std::string>;
 
+/// Writes pictures that the program painted to where they belong in a folder, in place of those of
+/// an earlier fill.
+/// \throws IoError
+void write_pictures_beside(const std::filesystem::path& folder, const PicturesBeside& pictures);
+
 /// Copies the files of a model byte for byte, with another fill.
 /// \param folder    as read_model() takes it
 /// \param pictures  what the program painted, in kSurroundingsFolder; those of an earlier fill go

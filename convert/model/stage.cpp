@@ -29,7 +29,7 @@ const std::array<StageTraits, kStages>& stage_table() {
         "splats for browsers",
         {124 * kMebi, 745, 0, 0, 0},
         {"web/splats.glb"},
-        {"web/splats.spz"}},
+        {"web/splats.spz", "web/surroundings/hole_*.png"}},
        {Stage::Mesh,
         "mesh",
         "volume and mesh",

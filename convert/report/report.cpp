@@ -141,6 +141,27 @@ std::string thinning_section(const Json& report) {
   return html.str();
 }
 
+// What in web/splats no photograph saw; "" where nobody asked for that.
+std::string fill_paragraph(const Json& splats) {
+  const std::string left_out = splats.value("left_out", Json::object()).value("fill", "");
+  if (!left_out.empty()) {
+    return "<p>Holes of web/splats stay open: " + escaped(left_out) + ".</p>\n";
+  }
+  const Json fill = splats.value("fill", Json());
+  if (!fill.is_object()) return "";
+  std::string out = "<p>Holes of web/splats are filled with pieces of what is around them: " +
+                    number(fill["splats"], "%.0f") + " synthetic splats, " +
+                    percent(fill["synthetic_fraction"]) +
+                    " of all, tagged in splats.glb and not told apart in splats.spz. Nothing "
+                    "measures them. " +
+                    percent(fill["open_fraction"]) + " of the holes stay open.";
+  const Json& shown = fill["held_out"];
+  if (shown.is_object()) {
+    out += " Held-out views with them: " + number(shown["psnr"], "%.2f") + " dB.";
+  }
+  return out + "</p>\n";
+}
+
 // Of input photographs that were taken through water; else empty.
 std::string restored_figure(const std::filesystem::path& file) {
   return is_present(file) ? figure(file, "restored: the photograph without the water") : "";
@@ -320,7 +341,8 @@ void write_html_report(const std::filesystem::path& folder,
        << water_section(report["model"].value("water", Json()))
        << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
        << training_section(report["model"]) << thinning_section(report)
-       << timing_section(report["stages"]) << "</body></html>\n";
+       << fill_paragraph(report["splats"]) << timing_section(report["stages"])
+       << "</body></html>\n";
   write_file(folder / "report.html", html.str());
 }
 

@@ -181,10 +181,15 @@ StageResult run_evaluation(Run& run, const Progress& progress) {
 }
 
 StageResult run_splats(Run& run, const Progress& progress) {
-  const WebSplats made = write_web_splats(
-      run.request.output / "web", loaded_model(run), progress, run.request.local_origin);
-  return {web_splats_to_json(made),
-          "kept " + std::to_string(made.thinned.splats.size()) + " of " + std::to_string(made.of)};
+  const WebSplats made = write_web_splats(run.request.output / "web",
+                                          loaded_model(run),
+                                          {run.request.fill, run.request.local_origin},
+                                          progress);
+  StageResult out{
+      web_splats_to_json(made),
+      "kept " + std::to_string(made.thinned.splats.size()) + " of " + std::to_string(made.of)};
+  if (made.fill) out.remark += ", with " + std::to_string(made.fill->splats.size()) + " synthetic";
+  return out;
 }
 
 StageResult run_mesh(Run& run, const Progress& progress) {

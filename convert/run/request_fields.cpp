@@ -265,6 +265,7 @@ std::vector<RequestField> all_fields() {
   out.push_back(chosen("max_voxels", Stage::Mesh, &RunRequest::max_voxels));
   out.push_back(chosen("glb_encoding", Stage::Web, &RunRequest::glb_encoding));
   out.push_back(chosen("texture", Stage::Web, &RunRequest::texture));
+  out.push_back(chosen("fill", Stage::Splats, &RunRequest::fill));
   out.push_back(chosen("local_origin", Stage::Splats, &RunRequest::local_origin));
   out.push_back(chosen("estimated", Stage::Mesh, &RunRequest::estimated));
   out.push_back(stating_scale({"stated_scale", Stage::Scale, stated_scale}));

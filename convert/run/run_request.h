@@ -29,6 +29,7 @@ struct RunRequest {
   EstimatedSurface estimated = EstimatedSurface::FillOnly;
   std::string max_error;      ///< Promise: how far the written meshes lie from the fused
                               ///< surface at most; empty = none.
+  bool fill = false;          ///< Of web/splats, as WebSplatsOptions.
   bool local_origin = false;  ///< Of asset.glb, its levels and splats.glb, as GlbOptions.
   size_t lods = 0;            ///< Coarser levels of asset.glb, 0 to kMostLods.
   size_t max_size = 0;        ///< Promise: largest asset.glb [bytes]; 0 = any.

@@ -15,6 +15,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
 #include "libcgs/priors/water.h"
+#include "libcgs/splats/splat_merging.h"
 
 namespace cgs {
 
@@ -49,6 +50,40 @@ ThinnedSplats thinned_splats(const Model& model, const Progress& progress) {
   return thin_splats(model.gaussians, scene, counts_of_views(model), progress);
 }
 
+// As few as the others are, by the cameras that they were painted in.
+Gaussians merged_fill(const PaintedHoles& made, const std::optional<float>& most_cost) {
+  if (!most_cost) return made.fill.gaussians;
+  std::vector<Camera> cameras;
+  for (const PaintedView& view : made.painted.views) cameras.push_back(view.camera);
+  return merge_splats(weigh_splats(made.fill.gaussians, cameras), {.most_cost = *most_cost}).splats;
+}
+
+double share_left_open(const PaintedFill& fill) {
+  size_t holes = 0;
+  size_t open = 0;
+  for (const ViewFill& view : fill.views) {
+    holes += view.holes;
+    open += view.left_open + view.unplaced + view.shone_through;
+  }
+  return holes == 0 ? 0 : double(open) / double(holes);
+}
+
+void fill_holes(const Model& model, WebSplats& out, const Progress& progress) {
+  try {
+    PaintedHoles made = paint_surroundings(model, progress);
+    if (made.fill.gaussians.size() == 0) {
+      out.fill_left_out = "what is open is looked at by a photograph, is sky, or is too far away";
+      return;
+    }
+    out.fill = WebFill{merged_fill(made, out.thinned.most_cost),
+                       std::move(made.pictures),
+                       share_left_open(made.fill),
+                       {}};
+  } catch (const NumericalError& error) {
+    out.fill_left_out = error.what();
+  }
+}
+
 /// Two sets change places for as long as this lives: a model is large to copy.
 class Exchange {
  public:
@@ -80,28 +115,35 @@ std::optional<ViewFigures> held_out_figures(const Model& model, const Progress& 
 
 WebSplats write_web_splats(const std::filesystem::path& folder,
                            Model& model,
-                           const Progress& progress,
-                           bool local_origin) {
+                           const WebSplatsOptions& options,
+                           const Progress& progress) {
   const Frame& frame = model.scene.frame;
-  const Eigen::Matrix3d y_up = y_up_from(model.scene.frame.up);
+  const Eigen::Matrix3d y_up = y_up_from(frame.up);
   make_output_folder(folder);
   WebSplats out;
-  out.thinned = thinned_splats(model, part_of(progress, 0, 0.9));
+  const double thinned = options.fill ? 0.5 : 0.9;
+  out.thinned = thinned_splats(model, part_of(progress, 0, thinned));
   out.of = model.gaussians.size();
-  Gaussians& splats = out.thinned.splats;
-  out.glb_bytes = write_splat_glb(folder / "splats.glb",
-                                  splats,
-                                  frame,
-                                  {y_up, evidence_of_thinned(model, splats.size()), local_origin});
-  out.held_out_of_all = held_out_figures(model, part_of(progress, 0.9, 0.95));
+  if (options.fill) fill_holes(model, out, part_of(progress, thinned, 0.9));
+  out.held_out_of_all = held_out_figures(model, part_of(progress, 0.9, 0.93));
+  Gaussians shown = out.thinned.splats;
   {
-    const Exchange exchange(model.gaussians, splats);
-    out.held_out = held_out_figures(model, part_of(progress, 0.95, 1));
+    const Exchange exchange(model.gaussians, shown);
+    out.held_out = held_out_figures(model, part_of(progress, 0.93, 0.96));
+    if (out.fill) {
+      append(model.gaussians, out.fill->splats);
+      out.fill->held_out = held_out_figures(model, part_of(progress, 0.96, 1));
+    }
   }
+  write_pictures_beside(folder, out.fill ? out.fill->pictures : PicturesBeside());
+  const std::string evidence = with_synthetic(evidence_of_thinned(model, out.thinned.splats.size()),
+                                              out.fill ? out.fill->splats.size() : 0);
+  out.glb_bytes =
+      write_splat_glb(folder / "splats.glb", shown, frame, {y_up, evidence, options.local_origin});
   try {
     constexpr double kOfPixel = 1.0 / 16;
     out.spz = write_spz(folder / "splats.spz",
-                        splats,
+                        shown,
                         frame,
                         {.finest = kOfPixel * double{out.thinned.pixel}, .y_up = y_up});
   } catch (const InvalidInput& error) {
@@ -121,7 +163,17 @@ Json web_splats_to_json(const WebSplats& made) {
                          {"fractional_bits", made.spz->fractional_bits},
                          {"clamped_splats", made.spz->clamped}};
   } else {
-    out["left_out"] = {{"splats.spz", made.spz_left_out}};
+    out["left_out"]["splats.spz"] = made.spz_left_out;
+  }
+  if (made.fill) {
+    const auto count = double(made.fill->splats.size());
+    out["fill"] = {
+        {"splats", made.fill->splats.size()},
+        {"synthetic_fraction", count / (count + double(made.thinned.splats.size()))},
+        {"open_fraction", made.fill->left_open},
+        {"held_out", made.fill->held_out ? figures_to_json(*made.fill->held_out) : Json()}};
+  } else if (!made.fill_left_out.empty()) {
+    out["left_out"]["fill"] = made.fill_left_out;
   }
   return out;
 }

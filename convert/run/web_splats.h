@@ -8,12 +8,27 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/model/evaluation.h"
+#include "convert/model/hole_pictures.h"
 #include "convert/model/model.h"
 #include "io/splats/spz.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/splats/splat_thinning.h"
 
 namespace cgs {
+
+struct WebSplatsOptions {
+  bool fill = false;          ///< Fill holes with pieces of what is around them.
+  bool local_origin = false;  ///< Of splats.glb, as SplatGlbOptions.
+};
+
+/// What was painted into the holes, and follows the splats of the model.
+struct WebFill {
+  Gaussians splats;         ///< Tagged synthetic.
+  PicturesBeside pictures;  ///< Of which they were made.
+  double left_open = 0;     ///< Share of the holes, by pixels.
+  /// As WebSplats::held_out, with these splats.
+  std::optional<ViewFigures> held_out;
+};
 
 /// What write_web_splats() made.
 struct WebSplats {
@@ -23,14 +38,15 @@ struct WebSplats {
   /// out.
   std::optional<ViewFigures> held_out;
   std::optional<ViewFigures> held_out_of_all;  ///< Likewise, of the splats of the model.
+  std::optional<WebFill> fill;                 ///< Empty if nobody asked, or:
+  std::string fill_left_out;                   ///< Why there is none, for people.
   size_t glb_bytes = 0;
   std::optional<SpzReport> spz;
   std::string spz_left_out;  ///< Why there is none, for people.
 };
 
-/// {"thinning": {…, "held_out", "held_out_of_all"}, "splats.glb": {…}, "splats.spz": {…},
-/// "left_out":
-/// {"splats.spz": "why"}}
+/// {"thinning": {…, "held_out", "held_out_of_all"}, "splats.glb": {…}, "splats.spz": {…}, "fill":
+/// {…}, "left_out": {"splats.spz" or "fill": "why"}}, without what nobody asked for
 nlohmann::ordered_json web_splats_to_json(const WebSplats& made);
 
 /// Writes the splats of a model for viewers in browsers: splats.glb and splats.spz, thinned by
@@ -38,12 +54,14 @@ nlohmann::ordered_json web_splats_to_json(const WebSplats& made);
 /// SPZ are no reason to end a run: it is left out then.
 /// The .glb says what the model rests on, and what vouches for each splat where that is stated; SPZ
 /// has no place for these.
-/// \param model         as before when this returns or throws
-/// \param local_origin  of splats.glb, as SplatGlbOptions
+///
+/// A fill is that of paint_surroundings(), merged as the others are; its pictures lie beside the
+/// files. Where nothing can be painted, it is left out.
+/// \param model  as before when this returns or throws
 /// \throws Error as load_images()
 WebSplats write_web_splats(const std::filesystem::path& folder,
                            Model& model,
-                           const Progress& progress = {},
-                           bool local_origin = false);
+                           const WebSplatsOptions& options = {},
+                           const Progress& progress = {});
 
 }  // namespace cgs

@@ -332,9 +332,7 @@ GaussianFile painted_splats(const Model& model) {
   GaussianFile out;
   out.gaussians = model.gaussians;
   append(out.gaussians, model.fill);
-  out.evidence = model.evidence;
-  if (!out.evidence.empty()) out.evidence += "; ";
-  out.evidence += "with " + std::to_string(model.fill.size()) + " synthetic Gaussians";
+  out.evidence = with_synthetic(model.evidence, model.fill.size());
   return out;
 }
 

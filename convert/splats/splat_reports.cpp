@@ -37,4 +37,10 @@ Json thinning_to_json(const ThinnedSplats& thinned, size_t before) {
   return out;
 }
 
+std::string with_synthetic(std::string evidence, size_t count) {
+  if (count == 0) return evidence;
+  if (!evidence.empty()) evidence += "; ";
+  return evidence + "with " + std::to_string(count) + " synthetic Gaussians";
+}
+
 }  // namespace cgs

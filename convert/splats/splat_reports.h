@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -18,5 +19,8 @@ nlohmann::ordered_json floaters_to_json(const Floaters& floaters, const Frame& f
 /// {"kept", "of", "chosen", "most_loss_db", "unseen_psnr", "tried": [{"most_cost", "splats",
 /// "loss_db"}]}
 nlohmann::ordered_json thinning_to_json(const ThinnedSplats& thinned, size_t before);
+
+/// What splats rest on, in words, with some that were made up among them.
+std::string with_synthetic(std::string evidence, size_t count);
 
 }  // namespace cgs
