@@ -105,13 +105,14 @@ def test_runs():
     cameras["frames"] = cameras["frames"][:3]
     shutil.copytree(capture / "images", work / "cut/images")
     (work / "cut/transforms.json").write_text(json.dumps(cameras))
-    told = cgs("run", "cut", "--preset", "draft", "--set", "steps=2", "--max-size", "60kB",
+    told = cgs("run", "cut", "--preset", "draft", "--set", "steps=2", "--max-size", "60kB", "--fill",
                "--max-error", "0.5", "--estimated", "keep",
                "--local-origin", "--use-all", "--old-photographs", "--texture", "atlas", "-o", "plain")
     assert told["web"]["texture"]["atlas"]["charts"] > 0
     assert told["evaluation"] is None and told["units"] == "unknown"
     assert told["mesh"]["output"]["left_out"] and told["mesh"]["promise"]
     assert len(told["model"]["loss"]) == 2 and told["web"]["asset.glb"]["words"]
+    assert told["splats"]["fill"]["splats"] > 0 and "fill" not in file("metric/report.json", "run")["splats"]
     assert told["model"]["responses"]["terms"]
     for name in ("metric", "plain"):
         assert "seconds" not in file(f"{name}/model/training.json", "train")

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/bytes/sha256.h"
 #include "io/splats/splat_reader.h"
+#include "tests/support/panel_model.h"
 #include "tests/support/sample_splats.h"
 #include "tests/support/temp_dir.h"
 
@@ -37,6 +39,30 @@ TEST(WriteWebSplats, KeepsTheLabelsOfTheModel) {
   model.scene.frame.up = -Eigen::Vector3d::UnitY();
   write_web_splats(dir.path(), model);
   EXPECT_EQ(read_splats(dir / "splats.glb").gaussians.provenance, model.gaussians.provenance);
+}
+
+TEST(WriteWebSplats, FillsHolesWithSplatsThatAreTagged) {
+  const test::TempDir dir;
+  Model model = test::panel_model();
+  for (View& view : model.scene.views) view.image_path.clear();  // none to thin by
+  const size_t before = model.gaussians.size();
+  const WebSplats made = write_web_splats(dir.path(), model, {.fill = true});
+  ASSERT_TRUE(made.fill.has_value());
+  EXPECT_EQ(model.gaussians.size(), before);
+  const size_t count = made.fill->splats.size();
+  EXPECT_GT(count, 100u);
+  const GaussianFile file = read_splats(dir / "splats.glb");
+  EXPECT_EQ(file.gaussians.size(), before + count);
+  EXPECT_EQ(synthetic_count(file.gaussians), count);
+  for (const auto& [name, hash] : file.gaussians.synthetic_sources) {
+    EXPECT_EQ(sha256(test::read_bytes(dir / name)), hash);
+  }
+  EXPECT_NE(file.evidence.find(std::to_string(count) + " synthetic"), std::string::npos);
+  EXPECT_EQ(web_splats_to_json(made)["fill"]["splats"], count);
+
+  write_web_splats(dir.path(), model);
+  EXPECT_EQ(synthetic_count(read_splats(dir / "splats.glb").gaussians), 0u);
+  EXPECT_FALSE(std::filesystem::exists(dir / "surroundings"));
 }
 
 }  // namespace
