@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -15,24 +16,27 @@
 
 #include "libcgs/core/bilinear.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/texture_corners.h"
 #include "meshing/mesh/halfedges.h"
 #include "meshing/mesh/projected_faces.h"
+#include "meshing/mesh/vertex_faces.h"
 
 namespace cgs {
 
 namespace {
 
-constexpr int kPadding = 8;        // [pixels]; as much as files keep around faces
-constexpr double kMostLeft = 0.9;  // of the steps, for what is added to be of light
+constexpr int kPadding = 8;  // [pixels]; as much as files keep around faces
 
-/// An edge between faces of two photographs, and how much brighter the first of them is around its
-/// ends.
+/// An edge between faces of two photographs.
 struct Seam {
   std::array<uint32_t, 2> ends;
   std::array<int, 2> photographs;
   double length = 0;  ///< [internal units]
+  /// How much brighter the first of them is along the halves at its ends.
   std::array<Eigen::Vector3d, 2> step;
+  /// The same of the surface around the ends: what of it is of light.
+  std::array<Eigen::Vector3d, 2> light;
 };
 
 Eigen::Vector3d shown_color(const Photograph& photograph, const Eigen::Vector3d& point) {
@@ -54,8 +58,41 @@ Eigen::Vector3d step_around(const Photograph& a,
   return sum / kShares.size();
 }
 
+/// The median of some differences, drawn to 0 as far as their scatter explains it: detail that lies
+/// a little off in one photograph is no light.
+double light_of(const std::vector<double>& steps) {
+  const double middle = median_of(steps);
+  std::vector<double> off;
+  for (const double step : steps) off.push_back(std::abs(step - middle));
+  constexpr double kNormal = 1.4826;    // sigma over median deviation, of a normal distribution
+  constexpr double kOfMedian = 1.2533;  // its standard error over that of the mean
+  const double sigma = kOfMedian * kNormal * median_of(off) / std::sqrt(double(steps.size()));
+  if (std::abs(middle) <= sigma) return 0;
+  return middle * (1 - sigma * sigma / (middle * middle));
+}
+
+/// How much brighter one photograph is than another on the faces around a vertex.
+Eigen::Vector3d light_around(const TriangleMesh& mesh,
+                             std::span<const uint32_t> faces,
+                             const Photograph& a,
+                             const Photograph& b) {
+  std::array<std::vector<double>, 3> steps;
+  for (const uint32_t f : faces) {
+    std::array<Eigen::Vector3f, 3> corner;
+    for (size_t k = 0; k < 3; ++k) corner.at(k) = mesh.vertices[mesh.faces[f].at(k)];
+    const Eigen::Vector3f middle = (corner[0] + corner[1] + corner[2]) / 3;
+    for (const Eigen::Vector3f& c : corner) {
+      const Eigen::Vector3d p = (0.5f * (middle + c)).cast<double>();
+      const Eigen::Vector3d step = shown_color(a, p) - shown_color(b, p);
+      for (size_t k = 0; k < 3; ++k) steps.at(k).push_back(step[Eigen::Index(k)]);
+    }
+  }
+  return {light_of(steps[0]), light_of(steps[1]), light_of(steps[2])};
+}
+
 std::vector<Seam> seams_of(const TriangleMesh& mesh, const PhotoTexture& texture) {
   const auto adjacent = halfedges::adjacent_faces(mesh);
+  const VertexFaces around = faces_of_vertices(mesh.vertices.size(), mesh.faces);
   std::vector<Seam> out;
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     for (size_t k = 0; k < 3; ++k) {
@@ -71,7 +108,9 @@ std::vector<Seam> seams_of(const TriangleMesh& mesh, const PhotoTexture& texture
       out.push_back({ends,
                      {a, b},
                      (q - p).norm(),
-                     {step_around(first, second, p, q), step_around(first, second, q, p)}});
+                     {step_around(first, second, p, q), step_around(first, second, q, p)},
+                     {light_around(mesh, around.of(ends[0]), first, second),
+                      light_around(mesh, around.of(ends[1]), first, second)}});
     }
   }
   return out;
@@ -155,7 +194,7 @@ Eigen::MatrixX3d offsets(const TriangleMesh& mesh,
   }
   for (const Seam& seam : seams) {
     for (size_t k = 0; k < 2; ++k) {
-      const Eigen::Vector3d& step = seam.step.at(k);
+      const Eigen::Vector3d& step = seam.light.at(k);
       const double trust = 1 / (1 + step.squaredNorm() / (3 * options.outlier * options.outlier));
       membrane.add_step(corners(seam.ends.at(k), seam.photographs[0]),
                         corners(seam.ends.at(k), seam.photographs[1]),
@@ -264,14 +303,12 @@ SeamLevelling level_seams(const TriangleMesh& mesh,
   require(pixel > 0 && std::isfinite(pixel), "level_seams: pixel must be > 0", pixel);
   const TextureCorners corners(mesh.faces, texture.of_face, mesh.vertices.size());
   const Eigen::MatrixX3d added = offsets(mesh, texture, corners, seams, pixel, options);
-  const double before = mean_step(seams, corners, Eigen::MatrixX3d::Zero(added.rows(), 3));
-  const double after = mean_step(seams, corners, added);
-  if (after > kMostLeft * before) return {before, before};
   tbb::parallel_for(size_t(0), texture.photographs.size(), [&](size_t i) {
     add_to_photograph(
         mesh, texture, static_cast<int>(i), corners, added, texture.photographs[i].image);
   });
-  return {before, after};
+  const Eigen::MatrixX3d none = Eigen::MatrixX3d::Zero(added.rows(), 3);
+  return {mean_step(seams, corners, none), mean_step(seams, corners, added)};
 }
 
 }  // namespace cgs

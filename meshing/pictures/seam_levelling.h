@@ -29,8 +29,8 @@ struct SeamLevelling {
 
 /// Makes photographs meet in colour where a face of one borders on a face of another. What is added
 /// to them is a membrane over the faces of each, as smooth as it can be, joined to the others along
-/// the seams and drawn to 0. What would take away less than a tenth of the steps follows detail
-/// that lies a little off, and not light: photographs stay as they are then.
+/// the seams and drawn to 0. Steps are medians over the faces around, less what their scatter
+/// explains: detail that lies a little off is no light.
 /// \param texture  its photographs are changed where faces show them, and 8 pixels around
 /// \param pixel    size of a pixel of the photographs on the surface [internal units]
 /// \pre the texture fits the mesh

@@ -16,27 +16,30 @@ using Eigen::Vector3f;
 constexpr int kWidth = 240;
 constexpr int kHeight = 12;
 
-// A strip of one square per pixel, a pixel within the border of the picture, seen from straight
-// above: the left half is shown by one photograph, the right half by another.
+// A strip of squares, one per pixel if not said otherwise, a pixel within the border of the
+// picture, seen from straight above: the left half is shown by one photograph, the right half by
+// another.
 struct Strip {
   TriangleMesh mesh;
   PhotoTexture texture;
 };
 
-Strip strip(const Vector3f& left, const Vector3f& right) {
+Strip strip(const Vector3f& left, const Vector3f& right, int square = 1) {
   Strip out;
-  constexpr int kColumns = kWidth - 2;
-  constexpr int kRows = kHeight - 2;
-  for (int y = 0; y <= kRows; ++y) {
-    for (int x = 0; x <= kColumns; ++x) out.mesh.vertices.emplace_back(1.0f + x, 1.0f + y, 1.0f);
+  const int columns = (kWidth - 2) / square;
+  const int rows = (kHeight - 2) / square;
+  for (int y = 0; y <= rows; ++y) {
+    for (int x = 0; x <= columns; ++x) {
+      out.mesh.vertices.emplace_back(float(1 + square * x), float(1 + square * y), 1.0f);
+    }
   }
-  for (int y = 0; y < kRows; ++y) {
-    for (int x = 0; x < kColumns; ++x) {
-      const auto a = static_cast<uint32_t>(y * (kColumns + 1) + x);
-      const auto below = static_cast<uint32_t>(a + kColumns + 1);
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const auto a = static_cast<uint32_t>(y * (columns + 1) + x);
+      const auto below = static_cast<uint32_t>(a + columns + 1);
       out.mesh.faces.push_back({a, below, a + 1});
       out.mesh.faces.push_back({a + 1, below, below + 1});
-      for (int k = 0; k < 2; ++k) out.texture.of_face.push_back(x < kColumns / 2 ? 0 : 1);
+      for (int k = 0; k < 2; ++k) out.texture.of_face.push_back(x < columns / 2 ? 0 : 1);
     }
   }
   Camera camera;
@@ -129,19 +132,26 @@ TEST(LevelSeams, BelievesLargeStepsLess) {
   EXPECT_GT(share_mended(0.05f), share_mended(0.6f));
 }
 
-// Texture that lies a little off is one step at one pixel and another at the next.
-TEST(LevelSeams, LeavesPhotographsThatDifferInDetailAlone) {
-  Strip strip = seam_levelling_test::strip(Vector3f::Constant(0.5f), Vector3f::Constant(0.5f));
-  ColorImage& right = strip.texture.photographs[1].image;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) right(x, y).array() += y % 4 < 2 ? 0.05f : -0.045f;
+// An edge of colours along a seam that lies a seventh of a pixel off in one photograph.
+TEST(LevelSeams, LeavesWhatLiesALittleOff) {
+  constexpr int kSquare = 4;
+  constexpr float kOff = 0.15f;
+  Strip strip = seam_levelling_test::strip(Vector3f::Zero(), Vector3f::Zero(), kSquare);
+  const int seam = 1 + kSquare * ((kWidth - 2) / kSquare / 2);
+  for (size_t i = 0; i < 2; ++i) {
+    ColorImage& image = strip.texture.photographs[i].image;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) image(x, y).setConstant(x < seam ? 0.5f : 0.9f);
+      if (i == 1) image(seam, y).setConstant(0.9f - 0.4f * kOff);
+    }
   }
   const PhotoTexture before = strip.texture;
-  const SeamLevelling levelled = level_seams(strip.mesh, strip.texture, 1);
-  EXPECT_GT(levelled.step_before, 0.02);
-  EXPECT_EQ(levelled.step_after, levelled.step_before);
+  EXPECT_GT(level_seams(strip.mesh, strip.texture, 1).step_before, 0.02);
   for (size_t i = 0; i < 2; ++i) {
-    EXPECT_EQ(strip.texture.photographs[i].image.data, before.photographs[i].image.data);
+    for (size_t p = 0; p < before.photographs[i].image.data.size(); ++p) {
+      const Vector3f& was = before.photographs[i].image.data[p];
+      ASSERT_LT((strip.texture.photographs[i].image.data[p] - was).norm(), 1.0f / 255);
+    }
   }
 }
 
