@@ -74,7 +74,8 @@ def main():
     at_once = min(on_node * args.nodes, most_at_once())
     scenes = list(itertools.islice(itertools.cycle([(plan, run) for plan, run, _ in jobs]), args.scenes))
     core_hours = threads * sum(plan + run + 2 * START for plan, run in scenes) / 3600
-    print(f"{len(jobs)} scenes are done: {sum(seconds) / len(seconds):.0f} s ({min(seconds):.0f} to "
+    done = "1 scene is done" if len(jobs) == 1 else f"{len(jobs)} scenes are done"
+    print(f"{done}: {sum(seconds) / len(seconds):.0f} s ({min(seconds):.0f} to "
           f"{max(seconds):.0f} s) on {threads} cores with up to {memory / 1000:.1f} GB")
     print(f"{args.scenes} of them on {args.nodes} nodes, {at_once} jobs at once: {core_hours:.1f} core-hours, "
           f"{finished_after(scenes, at_once) / 60:.0f} min")
