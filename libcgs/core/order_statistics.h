@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace cgs {
@@ -39,6 +41,15 @@ T quantile_of_sorted(const std::vector<T>& values, double q) {
 /// The middle value; of an even number of them the smaller one of the two.
 inline double median_of(std::vector<double> values) {
   return nth_smallest(values, (values.size() - 1) / 2);
+}
+
+/// 1.4826 times the median distance from the median: the standard deviation, if normal. 0 for none.
+inline double robust_deviation(std::vector<double> values) {
+  constexpr double kNormal = 1.4826;
+  if (values.empty()) return 0;
+  const double median = median_of(values);
+  for (double& value : values) value = std::abs(value - median);
+  return kNormal * median_of(std::move(values));
 }
 
 }  // namespace cgs

@@ -99,13 +99,6 @@ bool reweighted(const std::vector<FitPoint>& points, LineFit& line) {
 
 }  // namespace
 
-double robust_deviation(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const double median = median_of(values);
-  for (double& value : values) value = std::abs(value - median);
-  return kNormal * median_of(std::move(values));
-}
-
 std::optional<LineFit> fit_line(const std::vector<FitPoint>& points) {
   if (points.size() < kFewestOfAFit) return std::nullopt;
   LineFit line = least_median_line(points);

@@ -35,7 +35,4 @@ std::optional<LineFit> fit_line(const std::vector<FitPoint>& points);
 /// points.
 std::optional<LineFit> fit_scale(const std::vector<FitPoint>& points);
 
-/// 1.4826 times the median distance from the median: the standard deviation, if normal. 0 for none.
-double robust_deviation(std::vector<double> values);
-
 }  // namespace cgs

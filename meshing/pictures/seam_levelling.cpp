@@ -62,11 +62,8 @@ Eigen::Vector3d step_around(const Photograph& a,
 /// a little off in one photograph is no light.
 double light_of(const std::vector<double>& steps) {
   const double middle = median_of(steps);
-  std::vector<double> off;
-  for (const double step : steps) off.push_back(std::abs(step - middle));
-  constexpr double kNormal = 1.4826;    // sigma over median deviation, of a normal distribution
   constexpr double kOfMedian = 1.2533;  // its standard error over that of the mean
-  const double sigma = kOfMedian * kNormal * median_of(off) / std::sqrt(double(steps.size()));
+  const double sigma = kOfMedian * robust_deviation(steps) / std::sqrt(double(steps.size()));
   if (std::abs(middle) <= sigma) return 0;
   return middle * (1 - sigma * sigma / (middle * middle));
 }

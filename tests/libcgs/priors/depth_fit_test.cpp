@@ -63,14 +63,5 @@ TEST(FitScale, IsTheMedianRatio) {
   EXPECT_EQ(scale->offset, 0);
 }
 
-TEST(RobustDeviation, IsThatOfANormalDistribution) {
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal(5, 2);
-  std::vector<double> values;
-  for (int i = 0; i < 20000; ++i) values.push_back(i % 10 == 0 ? 1e6 : normal(random));
-  EXPECT_NEAR(robust_deviation(values), 2, 0.3);
-  EXPECT_EQ(robust_deviation({}), 0);
-}
-
 }  // namespace
 }  // namespace cgs::depth_fit_test
