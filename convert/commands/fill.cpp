@@ -52,15 +52,9 @@ Json to_json(const PaintedPictures& painted, const PaintedFill& fill, const Mode
 }
 
 std::string count_of(const PaintedFill& fill) {
-  size_t holes = 0;
-  size_t left_open = 0;
-  for (const ViewFill& view : fill.views) {
-    holes += view.holes;
-    left_open += view.left_open;
-  }
-  std::string out = std::to_string(fill.gaussians.size()) + " synthetic Gaussians";
-  if (left_open == 0) return out;
-  return out + "; " + percent(double(left_open) / double(holes)) + " of the holes stay open";
+  const std::string out = std::to_string(fill.gaussians.size()) + " synthetic Gaussians";
+  const double open = open_share(fill);
+  return open > 0 ? out + "; " + percent(open) + " of the holes stay open" : out;
 }
 
 PaintedHoles from_painter(const Model& model, const FillArgs& args, Terminal& terminal) {
@@ -71,6 +65,9 @@ PaintedHoles from_painter(const Model& model, const FillArgs& args, Terminal& te
     terminal.note({name + " is not painted and left out"});
   }
   out.fill = lift_painted(model, out.painted.views, terminal.begin("lift"));
+  if (out.fill.gaussians.size() == 0) {
+    throw NumericalError("nothing that was painted is hidden from all input views");
+  }
   terminal.end(count_of(out.fill));
   return out;
 }
@@ -91,12 +88,6 @@ void run_fill(const FillArgs& args) {
   terminal.warn(model.scene.warnings);
   const PaintedHoles made =
       args.painted ? from_painter(model, args, terminal) : from_surroundings(model, terminal);
-  if (made.fill.gaussians.size() == 0) {
-    throw NumericalError(args.painted
-                             ? "nothing that was painted is hidden from all input views"
-                             : "nothing can be painted: all holes are looked at by a photograph, "
-                               "lie in the sky, or are too far from what photographs show");
-  }
   write_filled_model(args.model, model, made.fill.gaussians, made.pictures, args.output);
   const Json report = to_json(made.painted, made.fill, model);
   terminal.say("synthetic: " + percent(report["synthetic_fraction"].get<double>()) +

@@ -277,6 +277,11 @@ PaintedHoles paint_surroundings(const Model& model, const Progress& progress) {
     return out.painted.views.back();
   };
   out.fill = lift_painted(model, chosen.cameras, paint, part_of(progress, 0.5, 1));
+  if (out.fill.gaussians.size() == 0) {
+    throw NumericalError(
+        "nothing can be painted: all holes are looked at by a photograph, lie in "
+        "the sky, or are too far from what photographs show");
+  }
   return out;
 }
 

@@ -68,7 +68,8 @@ struct PaintedHoles {
 
 /// Paints the holes as seen from the cameras of hole_views() with painted_surroundings(), and makes
 /// Gaussians of them.
-/// \throws InvalidInput, NumericalError as write_hole_pictures()
+/// \throws InvalidInput, NumericalError as write_hole_pictures(); NumericalError also if nothing can
+///         be painted
 PaintedHoles paint_surroundings(const Model& model, const Progress& progress);
 
 }  // namespace cgs

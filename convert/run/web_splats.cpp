@@ -58,26 +58,12 @@ Gaussians merged_fill(const PaintedHoles& made, const std::optional<float>& most
   return merge_splats(weigh_splats(made.fill.gaussians, cameras), {.most_cost = *most_cost}).splats;
 }
 
-double share_left_open(const PaintedFill& fill) {
-  size_t holes = 0;
-  size_t open = 0;
-  for (const ViewFill& view : fill.views) {
-    holes += view.holes;
-    open += view.left_open + view.unplaced + view.shone_through;
-  }
-  return holes == 0 ? 0 : double(open) / double(holes);
-}
-
 void fill_holes(const Model& model, WebSplats& out, const Progress& progress) {
   try {
     PaintedHoles made = paint_surroundings(model, progress);
-    if (made.fill.gaussians.size() == 0) {
-      out.fill_left_out = "what is open is looked at by a photograph, is sky, or is too far away";
-      return;
-    }
     out.fill = WebFill{merged_fill(made, out.thinned.most_cost),
                        std::move(made.pictures),
-                       share_left_open(made.fill),
+                       open_share(made.fill),
                        {}};
   } catch (const NumericalError& error) {
     out.fill_left_out = error.what();
@@ -111,6 +97,14 @@ std::optional<ViewFigures> held_out_figures(const Model& model, const Progress& 
   return evaluate_views(model, model.scene.held_out, progress, HoleFill::None).mean;
 }
 
+// The same with other splats in their place.
+std::optional<ViewFigures> held_out_figures(Model& model,
+                                            Gaussians& splats,
+                                            const Progress& progress) {
+  const Exchange exchange(model.gaussians, splats);
+  return held_out_figures(model, progress);
+}
+
 }  // namespace
 
 WebSplats write_web_splats(const std::filesystem::path& folder,
@@ -126,15 +120,14 @@ WebSplats write_web_splats(const std::filesystem::path& folder,
   out.of = model.gaussians.size();
   if (options.fill) fill_holes(model, out, part_of(progress, thinned, 0.9));
   out.held_out_of_all = held_out_figures(model, part_of(progress, 0.9, 0.93));
-  Gaussians shown = out.thinned.splats;
-  {
-    const Exchange exchange(model.gaussians, shown);
-    out.held_out = held_out_figures(model, part_of(progress, 0.93, 0.96));
-    if (out.fill) {
-      append(model.gaussians, out.fill->splats);
-      out.fill->held_out = held_out_figures(model, part_of(progress, 0.96, 1));
-    }
+  out.held_out = held_out_figures(model, out.thinned.splats, part_of(progress, 0.93, 0.96));
+  Gaussians filled;
+  if (out.fill) {
+    filled = out.thinned.splats;
+    append(filled, out.fill->splats);
+    out.fill->held_out = held_out_figures(model, filled, part_of(progress, 0.96, 1));
   }
+  const Gaussians& shown = out.fill ? filled : out.thinned.splats;
   write_pictures_beside(folder, out.fill ? out.fill->pictures : PicturesBeside());
   const std::string evidence = with_synthetic(evidence_of_thinned(model, out.thinned.splats.size()),
                                               out.fill ? out.fill->splats.size() : 0);

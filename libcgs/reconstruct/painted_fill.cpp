@@ -221,6 +221,16 @@ void check_painted(const Model& model, size_t views) {
 
 }  // namespace
 
+double open_share(const PaintedFill& fill) {
+  size_t holes = 0;
+  size_t open = 0;
+  for (const ViewFill& view : fill.views) {
+    holes += view.holes;
+    open += view.left_open + view.unplaced + view.shone_through;
+  }
+  return holes == 0 ? 0 : double(open) / double(holes);
+}
+
 PaintedFill lift_painted(const Model& model,
                          const std::vector<PaintedView>& views,
                          const Progress& progress) {

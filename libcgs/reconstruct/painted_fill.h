@@ -51,6 +51,9 @@ struct PaintedFill {
   std::vector<ViewFill> views;
 };
 
+/// Share of the holes of its views, by pixels, that stay open: not painted, or not lifted.
+double open_share(const PaintedFill& fill);
+
 /// Makes a Gaussian of every painted pixel in a hole.
 ///
 /// Its depth is hidden_depth(): the far side of the hole goes on. Where an input view sees through
