@@ -229,6 +229,14 @@ std::vector<std::pair<size_t, size_t>> photos_from_one_place(const PoseSolution&
 }
 
 std::string focal_text(const UnposedPhoto& photo, const SolvedPhoto& solved) {
+  if (solved.is_assumed) {
+    return "neither the Exif of " + printable(photo.name) +
+           " nor what the photographs show tells the focal length: " +
+           std::to_string(std::lround(solved.camera.fx)) +
+           " pixels are assumed, as is typical of cameras, uncertain by " +
+           percent(solved.focal_sigma) +
+           ": depth may be stretched by as much; --focal states it, in pixels";
+  }
   return "focal length of " + printable(photo.name) +
          " solved for: " + std::to_string(std::lround(solved.camera.fx)) +
          " pixels, uncertain by " + percent(solved.focal_sigma) +
@@ -251,7 +259,7 @@ void add_remarks(const std::vector<UnposedPhoto>& photos,
                              " was left out: too little of what it shows is in the others");
     } else if (solved.focal_sigma > 0 && told.insert(photo.lens).second) {
       constexpr double kSure = 0.05;  // lengths along the view err by about as much
-      const bool is_doubtful = solved.is_refuted || solved.focal_sigma > kSure;
+      const bool is_doubtful = solved.is_refuted || solved.is_assumed || solved.focal_sigma > kSure;
       (is_doubtful ? out.warnings : out.notes).push_back(focal_text(photo, solved));
     }
   }

@@ -132,8 +132,9 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
   constexpr double kShortest = 0.32;  // [larger sides] phones' widest lenses have 0.36,
   constexpr double kLongest = 8;      // telephoto lenses of 300 mm 8.3
   for (size_t lens = 0; lens < priors.size(); ++lens) {
+    if (priors[lens].focal > 0) continue;  // its sigma is as wide as what was known, at most
     const double focal = scene.lenses[lens].focal / priors[lens].side;
-    if (priors[lens].focal == 0 && !(focal >= kShortest && focal <= kLongest)) {
+    if (!(focal >= kShortest && focal <= kLongest)) {
       constexpr double kFilm = 36;  // [mm] wide
       throw undetermined_focal(
           pairs, "they ask for a lens of " + decimals(kFilm * focal, 0) + " mm as on film");

@@ -23,7 +23,7 @@ void refuse_turned_only(const std::vector<UnposedPhoto>& photos,
                         const std::vector<LensPrior>& priors,
                         const std::vector<PhotoPair>& pairs);
 
-/// \throws NumericalError if a focal length that was solved for is not determined, or most matches
+/// \throws NumericalError if a focal length of which nothing was known is not determined, or most matches
 ///         disagree with the solution.
 /// \param focal_sigmas  per lens, as from adjust_bundle()
 void refuse_unsure(const std::vector<UnposedPhoto>& photos,

@@ -27,6 +27,11 @@ namespace {
 // widest lenses (13 mm as on film) to short telephoto lenses (115 mm).
 constexpr std::array<double, 8> kFocals = {0.36, 0.5, 0.7, 0.9, 1.15, 1.5, 2.2, 3.2};
 
+// Where nothing tells the focal length: phones' main lenses have 0.67 to 0.78 of the larger side,
+// compact cameras 0.75 to 2.4, and what is cut from their pictures more.
+constexpr double kTypicalFocal = 0.85;
+constexpr double kTypicalSigma = 0.25;
+
 // Of many photographs: more would tell little more, and take long.
 constexpr size_t kTracksPerPhoto = 400;
 
@@ -68,6 +73,15 @@ std::vector<Track> sample(const std::vector<Track>& tracks, size_t most) {
   return out;
 }
 
+// Whether focal lengths of several lenses may be quite others than known: then the starts, which
+// are the same for all, are wrong for some.
+bool are_vague(const std::vector<LensPrior>& priors) {
+  constexpr double kVague = 0.1;  // sigma of log(focal)
+  return std::count_if(priors.begin(), priors.end(), [](const LensPrior& prior) {
+           return prior.focal == 0 || prior.sigma > kVague;
+         }) > 1;
+}
+
 // \pre it has begun
 void adjust_focal(const std::vector<LensPrior>& priors,
                   const Progress& progress,
@@ -76,26 +90,50 @@ void adjust_focal(const std::vector<LensPrior>& priors,
                               .second = attempt.begun->second,
                               .solve_focal = true,
                               .progress = progress};
+  if (are_vague(priors)) {
+    // What does not fit at the focal lengths to begin with is needed to find the right ones.
+    adjust_bundle(attempt.scene, priors, options);
+    triangulate(attempt.scene, kMostError, least_angle(priors));
+  }
   adjust_bundle(attempt.scene, priors, options);
   drop_outliers(attempt.scene, kMostError, least_angle(priors));
   attempt.error = capped_error(attempt.scene);
 }
 
+// \param start  without places
+Attempt attempt_from(const Reconstruction& start,
+                     const std::vector<LensPrior>& priors,
+                     const std::vector<PhotoPair>& pairs,
+                     size_t most_placed,
+                     const Progress& progress) {
+  Attempt out;
+  out.scene = start;
+  out.begun = place_photos(out.scene, priors, pairs, most_placed, progress);
+  if (out.begun) adjust_focal(priors, progress, out);
+  return out;
+}
+
+// Where focal lengths are vague, what was placed at wrong ones stays in the way of the right ones:
+// begun again at those that were found, as long as that explains more.
 // \param start  without lenses and places
 Attempt attempt_at(double focal_of_side,
-                   const Reconstruction& start,
+                   Reconstruction start,
                    const std::vector<LensPrior>& priors,
                    const std::vector<PhotoPair>& pairs,
                    size_t most_placed,
                    const Progress& progress) {
-  Attempt out;
-  out.scene = start;
   for (const LensPrior& prior : priors) {
-    out.scene.lenses.push_back({prior.focal > 0 ? prior.focal : focal_of_side * prior.side, 0});
+    start.lenses.push_back({prior.focal > 0 ? prior.focal : focal_of_side * prior.side, 0});
   }
-  out.begun = place_photos(out.scene, priors, pairs, most_placed, progress);
-  if (out.begun) adjust_focal(priors, progress, out);
-  return out;
+  Attempt best = attempt_from(start, priors, pairs, most_placed, progress);
+  constexpr int kMostAgain = 3;
+  for (int again = 0; again < kMostAgain && best.begun && are_vague(priors); ++again) {
+    start.lenses = best.scene.lenses;
+    Attempt next = attempt_from(start, priors, pairs, most_placed, progress);
+    if (next.error >= best.error) break;
+    best = std::move(next);
+  }
+  return best;
 }
 
 // Share of the observations that a reconstruction has no point or no pose for.
@@ -387,6 +425,39 @@ std::optional<std::vector<UnposedPhoto>> without_stated(const std::vector<Unpose
   return out;
 }
 
+// The photographs with a typical focal length where nothing is known of theirs.
+std::vector<UnposedPhoto> with_typical(const std::vector<UnposedPhoto>& photos) {
+  std::vector<UnposedPhoto> out = photos;
+  for (UnposedPhoto& photo : out) {
+    if (photo.focal > 0) continue;
+    photo.focal = kTypicalFocal * std::max(photo.width, photo.height);
+    photo.focal_sigma = kTypicalSigma;
+  }
+  return out;
+}
+
+// As solve(); where that cannot tell the focal length, with one that is typical of cameras.
+// \throws NumericalError as solve() if that does not help either
+PoseSolution solve_or_assume(const std::vector<UnposedPhoto>& photos,
+                             const Matched& matched,
+                             const Progress& progress) {
+  std::exception_ptr undetermined;
+  try {
+    return solve(photos, matched, part_of(progress, 0, 0.8));
+  } catch (const WithRemedy<NumericalError>&) {
+    undetermined = std::current_exception();
+  }
+  try {
+    PoseSolution out = solve(with_typical(photos), matched, part_of(progress, 0.8, 1));
+    for (size_t i = 0; i < photos.size(); ++i) {
+      out.photos[i].is_assumed = out.photos[i].is_placed && photos[i].focal == 0;
+    }
+    return out;
+  } catch (const NumericalError&) {
+    std::rethrow_exception(undetermined);
+  }
+}
+
 }  // namespace
 
 PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress) {
@@ -400,7 +471,7 @@ PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress
   std::optional<std::vector<UnposedPhoto>> relaxed;
   std::exception_ptr failure;
   try {
-    out = solve(photos, matched, part_of(progress, 0.5, 0.9));
+    out = solve_or_assume(photos, matched, part_of(progress, 0.5, 0.9));
     relaxed = without_refuted(photos, out);
   } catch (const NumericalError&) {
     failure = std::current_exception();

@@ -18,6 +18,8 @@ struct SolvedPhoto {
   double focal_sigma = 0;  ///< Relative standard deviation of the focal length; 0 = it was given.
   bool is_refuted =
       false;  ///< The focal length known beforehand cannot be right, and was not used.
+  bool is_assumed =
+      false;  ///< Nothing tells the focal length: it lies near one that is typical of cameras.
   /// cam_from_world as solved; camera.world_from_cam is its inverse, with rounding.
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
@@ -51,7 +53,9 @@ struct PoseSolution {
 /// unknown, the one that explains the matches best is found. One that is known with a sigma is
 /// taken as unknown where it turns out to be three sigma off and the photographs, without it, are
 /// three sigma of both together away from it; or where no cameras are found with it but some
-/// without.
+/// without. Where none is known and the photographs do not tell it either, since they lie close
+/// together or show one plane, one that is typical of cameras is taken as known with a sigma of a
+/// quarter: what is seen fits, and its depth may be stretched.
 ///
 /// focal_sigma is wider than that of the adjustment, which knows nothing of errors of the lens
 /// model: by the errors on photographs with known focal lengths (tests/eval/pose_accuracy).
@@ -60,8 +64,8 @@ struct PoseSolution {
 /// by rounding and by the choice of world axes.
 /// \pre lens counts from 0; equal lens means equal focal, focal_sigma and size but for turns
 /// \throws InvalidInput for fewer than two photographs; NumericalError where they cannot say: too
-///         few matches (naming the pair), no parallax (the camera was only turned), focal length
-///         not determined, matches that no cameras explain.
+///         few matches (naming the pair), no parallax (the camera was only turned), matches that
+///         no cameras explain.
 PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress = {});
 
 }  // namespace cgs

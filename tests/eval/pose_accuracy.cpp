@@ -5,13 +5,15 @@
 //   pose_accuracy FOLDER [SET]     FOLDER holds the data sets of kSets, each as its authors offer
 //                                  it (Strecha, Middlebury, MVImgNet, LLFF); SET = part of a name
 //
-// Prints per set and source of the focal length (given = of the data set, Exif, solved = unknown):
-// photographs placed, largest error of the cameras' axes, of where their pixels look (a principal
-// point off the centre, which few photographs do not tell, turns the axes but hardly the rays) and
-// of the direction between any two cameras [degrees], each after the rotation that brings all
-// cameras together best; of the focal length [%], the standard deviation claimed for it [%]; how
-// far points are from where they were seen [pixels, RMS], as solved and for the given cameras:
-// where these do as well, the photographs do not tell one from the other; and seconds.
+// Prints per set and source of the focal length (given = of the data set, Exif, solved = unknown,
+// each = unknown and of every photograph its own): photographs placed, largest error of the
+// cameras' axes, of where their pixels look (a principal point off the centre, which few
+// photographs do not tell, turns the axes but hardly the rays) and of the direction between any two
+// cameras [degrees], each after the rotation that brings all cameras together best; of the focal
+// length [%], the largest standard deviation claimed for one [%]; how far points are from where
+// they were seen [pixels, RMS], as solved and for the given cameras: where these do as well, the
+// photographs do not tell one from the other; and seconds.
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -179,11 +181,13 @@ bool measure(const Set& set,
     std::vector<Camera> all;
     std::vector<Camera> solved;
     std::vector<Camera> truth;
+    double sigma_claimed = 0;
     for (size_t i = 0; i < photos.size(); ++i) {
       all.push_back(solution.photos[i].camera);
       if (!solution.photos[i].is_placed) continue;
       solved.push_back(solution.photos[i].camera);
       truth.push_back(given[i]);
+      sigma_claimed = std::max(sigma_claimed, solution.photos[i].focal_sigma);
     }
     const test::PoseErrors errors = test::pose_errors(solved, truth);
     std::printf(" %2zu of %zu %9.3f %9.3f %9.3f %8.2f %8.2f %8.3f %8.3f %7.1f\n",
@@ -193,7 +197,7 @@ bool measure(const Set& set,
                 errors.rotation,
                 errors.direction,
                 100 * errors.focal,
-                100 * solution.photos[0].focal_sigma,
+                100 * sigma_claimed,
                 observation_rms(seen, all),
                 observation_rms(seen, given),
                 seconds.count());
@@ -215,7 +219,10 @@ bool measure_all(const Set& set, const Scene& scene, bool from_aside) {
     all &= measure(
         set, "Exif" + aside, photos.photos, photos.exif_focal, photos.exif_sigma, photos.given);
   }
-  return measure(set, "solved" + aside, photos.photos, 0, 0, photos.given) && all;
+  all &= measure(set, "solved" + aside, photos.photos, 0, 0, photos.given);
+  std::vector<UnposedPhoto> own = photos.photos;
+  for (size_t i = 0; i < own.size(); ++i) own[i].lens = static_cast<int>(i);
+  return measure(set, "each" + aside, own, 0, 0, photos.given) && all;
 }
 
 int run(const std::filesystem::path& data, const std::string& wanted) {

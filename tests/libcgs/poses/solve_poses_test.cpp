@@ -2,6 +2,7 @@
 #include "libcgs/poses/solve_poses.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -11,7 +12,6 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/poses/photo_pairs.h"
-#include "tests/support/remedy_of_refusal.h"
 #include "tests/support/unposed_photos.h"
 
 namespace cgs::solve_poses_test {
@@ -245,18 +245,44 @@ TEST(SolvePoses, RefusesACameraThatWasOnlyTurned) {
   }
 }
 
-TEST(SolvePoses, RefusesAPlaneWhereTheFocalLengthIsUnknownButNotWhereItIsGiven) {
+// Nothing is refused for want of a focal length: a typical one is assumed, and said to be
+// uncertain.
+TEST(SolvePoses, AssumesATypicalFocalLengthWhereAPlaneTellsNone) {
   PointScene scene = three_views();
   for (Eigen::Vector3d& p : scene.points) p.z() = 0.2 * p.x();
   scene.cameras.pop_back();
-  const std::string reason = refusal(unposed_photos(scene));
-  EXPECT_NE(reason.find("plane"), std::string::npos) << reason;
-  EXPECT_NE(reason.find("state it"), std::string::npos) << reason;
-  EXPECT_EQ(test::remedy_of_refusal([&] { solve_poses(unposed_photos(scene)); }),
-            Remedy::FocalLength);
-  scene.cameras = three_views().cameras;
+  const PoseSolution assumed = solve_poses(unposed_photos(scene));
+  for (const SolvedPhoto& photo : assumed.photos) {
+    EXPECT_TRUE(photo.is_assumed);
+    EXPECT_GT(photo.focal_sigma, 0.1);
+    EXPECT_LT(std::abs(std::log(photo.camera.fx / kFocal)), 2 * photo.focal_sigma);
+  }
+  EXPECT_LT(assumed.rms, 1);
   const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kFocal, 0));
   EXPECT_LT(pose_errors(cameras_of(solution), scene.cameras).rotation, 0.1);
+  for (const SolvedPhoto& photo : solution.photos) EXPECT_FALSE(photo.is_assumed);
+}
+
+// As of photographs by three people, or of postcards. Beginning at one focal length for all must
+// not end at a wrong one of each.
+TEST(SolvePoses, FindsTheFocalLengthsOfSeveralLenses) {
+  PointScene scene = three_views();
+  constexpr std::array<double, 3> kFocals = {620, 1500, 950};
+  for (size_t i = 0; i < kFocals.size(); ++i) {
+    Camera& camera = scene.cameras[i];
+    camera.fx = camera.fy = kFocals[i];
+    camera.world_from_cam.translation().z() *= kFocals[i] / kFocal;
+  }
+  std::vector<UnposedPhoto> photos = unposed_photos(scene);
+  for (size_t i = 0; i < photos.size(); ++i) photos[i].lens = static_cast<int>(i);
+  const PoseSolution solution = solve_poses(photos);
+  for (size_t i = 0; i < kFocals.size(); ++i) {
+    const SolvedPhoto& photo = solution.photos[i];
+    ASSERT_TRUE(photo.is_placed);
+    EXPECT_FALSE(photo.is_assumed);
+    EXPECT_LT(std::abs(std::log(photo.camera.fx / kFocals[i])), 0.05) << i;
+  }
+  EXPECT_LT(pose_errors(cameras_of(solution), scene.cameras).rotation, 0.5);
 }
 
 TEST(SolvePoses, RefusesTooLittleOverlapNamingTheBestPair) {
