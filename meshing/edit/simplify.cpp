@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -30,7 +31,7 @@ struct Measured {
 };
 
 Measured measure(const TriangleMesh& from,
-                 const TriangleMesh& to,
+                 const DistanceToMesh& distance,
                  const SimplifyOptions& options,
                  const Progress& progress) {
   constexpr size_t kLeast = 10000;
@@ -38,7 +39,6 @@ Measured measure(const TriangleMesh& from,
   const SurfaceSamples samples =
       sample_faces(from, std::clamp(2 * from.faces.size(), kLeast, kMost));
   if (samples.points.empty()) return {};  // faces without area
-  const DistanceToMesh distance(to);
   const std::vector<float> distances = distance.of(samples.points);
   std::array<std::vector<float>, 2> by_label;
   std::vector<float> of_face(from.faces.size(), 0);
@@ -165,6 +165,22 @@ class NewIntersections {
   std::vector<PairPlaces> given_;  // of the input, ascending
 };
 
+// Faces that share a corner with one of these, those themselves among them; ascending.
+std::vector<uint32_t> touching(const TriangleMesh& mesh, const std::vector<uint32_t>& faces) {
+  std::vector<uint8_t> corner(mesh.vertices.size(), 0);
+  for (const uint32_t f : faces) {
+    for (const uint32_t v : mesh.faces[f]) corner[v] = 1;
+  }
+  std::vector<uint32_t> out;
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto& face = mesh.faces[f];
+    if (std::any_of(face.begin(), face.end(), [&](uint32_t v) { return corner[v] != 0; })) {
+      out.push_back(f);
+    }
+  }
+  return out;
+}
+
 // Holds input vertices nearer to the result than in the last round.
 class Tightening {
  public:
@@ -176,18 +192,21 @@ class Tightening {
   }
   // The input vertices near a face of the result, or near a neighbour of it if it has none.
   void output_faces(const CollapsedMesh& output, const std::vector<uint32_t>& faces) {
-    std::vector<uint8_t> bad(output.mesh.faces.size(), 0);
-    std::vector<uint8_t> corner(output.mesh.vertices.size(), 0);
-    for (const uint32_t f : faces) {
-      for (const uint32_t v : output.mesh.faces[f]) corner[v] = 1;
+    const size_t count = output.mesh.faces.size();
+    std::vector<uint8_t> has_witness(count, 0);
+    for (const uint32_t f : output.witness_of) {
+      if (f < count) has_witness[f] = 1;
     }
-    for (size_t f = 0; f < bad.size(); ++f) {
-      const auto& face = output.mesh.faces[f];
-      bad[f] = std::any_of(face.begin(), face.end(), [&](uint32_t v) { return corner[v] != 0; });
-    }
+    std::vector<uint32_t> lone;
+    std::copy_if(faces.begin(), faces.end(), std::back_inserter(lone), [&](uint32_t f) {
+      return has_witness[f] == 0;
+    });
+    std::vector<uint8_t> bad(count, 0);
+    for (const uint32_t f : faces) bad[f] = 1;
+    for (const uint32_t f : touching(output.mesh, lone)) bad[f] = 1;
     for (size_t v = 0; v < marked_.size(); ++v) {
       const uint32_t f = output.witness_of[v];
-      if (f < bad.size() && bad[f] != 0) marked_[v] = 1;
+      if (f < count && bad[f] != 0) marked_[v] = 1;
     }
   }
   /// \return how many vertices changed.
@@ -195,7 +214,8 @@ class Tightening {
     size_t count = 0;
     for (size_t v = 0; v < marked_.size(); ++v) {
       if (marked_[v] == 0 || !(tolerance_[v] > 0)) continue;
-      tolerance_[v] *= 0.25f;
+      constexpr float kNearer = 1.0f / 16;
+      tolerance_[v] *= kNearer;
       if (double(tolerance_[v]) < least_) tolerance_[v] = 0;
       ++count;
     }
@@ -250,6 +270,7 @@ SimplifyResult simplify_connected(const TriangleMesh& mesh,
   hold_borders(mesh, options.max_area_change, limits.tolerance);
   CollapseHistory history;
   NewIntersections intersections(mesh);
+  std::optional<DistanceToMesh> to_input;
   constexpr int kRounds = 10;
   for (int round = 1; round <= kRounds; ++round) {
     const auto part = [&](double begin, double end) {
@@ -261,9 +282,11 @@ SimplifyResult simplify_connected(const TriangleMesh& mesh,
     result.area_after = area_by_provenance(out.mesh);
     if (tighten_for_area(mesh, result, options.max_area_change, limits.tolerance)) continue;
     Tightening tightening(limits.tolerance, options.max_error / 32);
-    std::vector<uint32_t> bad = intersections.faces_of(out.mesh);
-    const Measured forth = measure(out.mesh, mesh, options, part(0.7, 0.8));
-    const Measured back = measure(mesh, out.mesh, options, part(0.8, 1));
+    // What cuts itself may do so for what its neighbours did.
+    std::vector<uint32_t> bad = touching(out.mesh, intersections.faces_of(out.mesh));
+    if (!to_input) to_input.emplace(mesh);
+    const Measured forth = measure(out.mesh, *to_input, options, part(0.7, 0.8));
+    const Measured back = measure(mesh, DistanceToMesh(out.mesh), options, part(0.8, 1));
     bad.insert(bad.end(), forth.too_far.begin(), forth.too_far.end());
     if (!bad.empty()) tightening.output_faces(out, bad);
     for (const uint32_t f : back.too_far) tightening.input_face(mesh, f);

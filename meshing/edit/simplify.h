@@ -51,10 +51,10 @@ struct SimplifyResult {
 /// collapse_edges(). A mesh without provenance counts as evidence. What comes out is then measured:
 /// in both directions by points over the area and along all edges (see DistanceToMesh::of_edges()),
 /// by the area of every label with evidence, and for self-intersections that the input does not
-/// have in the same places. Where a check fails, the tolerance of the input vertices nearby is
-/// quartered, finally to zero, and the collapses that this concerns are done anew. If that does not
-/// help within ten rounds, the result is the input. Borders of labels are held nearer from the
-/// start, by their length and the area they enclose: ragged ones would lose too much of it.
+/// have in the same places. Where a check fails, the tolerance of the input vertices nearby
+/// becomes a sixteenth, finally zero, and the collapses that this concerns are done anew. If that
+/// does not help within ten rounds, the result is the input. Borders of labels are held nearer from
+/// the start, by their length and the area they enclose: ragged ones would lose too much of it.
 /// \throws InvalidInput if a vertex is not finite.
 SimplifyResult simplify(const TriangleMesh& mesh,
                         const SimplifyOptions& options,
