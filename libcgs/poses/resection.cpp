@@ -168,6 +168,8 @@ int points_in(const Reconstruction& scene, int photo) {
   return count;
 }
 
+bool explains_more(const PlacedPhotos& a, const PlacedPhotos& b) { return a.error < b.error; }
+
 double capped_error(const Reconstruction& scene) {
   constexpr double kCap = kMostError * kMostError;
   double sum = 0;
@@ -184,36 +186,29 @@ double capped_error(const Reconstruction& scene) {
   return count > 0 ? sum / double(count) : kCap;
 }
 
-std::optional<FirstPair> place_photos(Reconstruction& scene,
-                                      const std::vector<LensPrior>& priors,
-                                      const std::vector<PhotoPair>& pairs,
-                                      size_t most,
-                                      const Progress& progress) {
-  struct Try {
-    Reconstruction scene;
-    FirstPair begun;
-    double error = 0;
-  };
+PlacedPhotos place_photos(const Reconstruction& start,
+                          const std::vector<LensPrior>& priors,
+                          const std::vector<PhotoPair>& pairs,
+                          size_t most,
+                          const Progress& progress) {
   constexpr size_t kMostTries = 3;
-  std::vector<Try> tries;
-  for (const PhotoPair* pair : ranked_pairs(scene, pairs)) {
+  std::vector<PlacedPhotos> tries;
+  for (const PhotoPair* pair : ranked_pairs(start, pairs)) {
     if (tries.size() == kMostTries) break;
-    Reconstruction candidate = scene;
+    Reconstruction candidate = start;
     if (!begin_with(*pair, priors, progress, candidate)) continue;
-    tries.push_back({std::move(candidate), {pair->a, pair->b}});
+    tries.push_back({std::move(candidate), FirstPair{pair->a, pair->b}});
   }
   if (tries.empty()) {
-    forget(scene);
-    return std::nullopt;
+    PlacedPhotos none{start, std::nullopt};
+    forget(none.scene);
+    return none;
   }
   tbb::parallel_for(size_t{0}, tries.size(), [&](size_t i) {
-    place_more(tries[i].scene, priors, tries[i].begun, most, progress);
+    place_more(tries[i].scene, priors, *tries[i].begun, most, progress);
     tries[i].error = capped_error(tries[i].scene);
   });
-  Try& best = *std::min_element(
-      tries.begin(), tries.end(), [](const Try& a, const Try& b) { return a.error < b.error; });
-  scene = std::move(best.scene);
-  return best.begun;
+  return std::move(*std::min_element(tries.begin(), tries.end(), explains_more));
 }
 
 void place_more(Reconstruction& scene,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -25,19 +26,26 @@ struct FirstPair {
   int second = 0;
 };
 
+/// A reconstruction on the way, and how well it explains its tracks.
+struct PlacedPhotos {
+  Reconstruction scene;
+  std::optional<FirstPair> begun;                          ///< None where nothing could be placed.
+  double error = std::numeric_limits<double>::infinity();  ///< capped_error() [working pixels²].
+};
+
 /// Places as many photographs as it can, at the focal lengths the lenses have: a pair with many
 /// matches and much parallax first, then the photograph that shows the most known points, again
 /// and again. Of the most promising pairs to begin with, the one that explains most is kept.
 ///
-/// \param scene     with tracks and lenses; poses and positions are overwritten
+/// \param start     with tracks and lenses; poses and positions count for nothing
 /// \param most      photographs to place, at most
 /// \param progress  told again and again, never how much is done; from any thread, several at once
-/// \return nothing, and no pose, if no pair could be placed
-std::optional<FirstPair> place_photos(Reconstruction& scene,
-                                      const std::vector<LensPrior>& priors,
-                                      const std::vector<PhotoPair>& pairs,
-                                      size_t most,
-                                      const Progress& progress = {});
+/// \return no pose if no pair could be placed
+PlacedPhotos place_photos(const Reconstruction& start,
+                          const std::vector<LensPrior>& priors,
+                          const std::vector<PhotoPair>& pairs,
+                          size_t most,
+                          const Progress& progress = {});
 
 /// Goes on from there: triangulates what the placed photographs show and places further ones, until
 /// there are `most`.
@@ -46,6 +54,9 @@ void place_more(Reconstruction& scene,
                 const FirstPair& begun,
                 size_t most,
                 const Progress& progress = {});
+
+/// Whether the first has the smaller error.
+bool explains_more(const PlacedPhotos& a, const PlacedPhotos& b);
 
 /// Mean squared error of all observations, each at most kMostError² (those without a point or pose
 /// count as much): for comparing solutions of the same tracks.

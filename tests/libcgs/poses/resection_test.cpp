@@ -62,9 +62,11 @@ double turn_off(const Arc& arc, const Reconstruction& scene, size_t a, size_t b)
 
 TEST(PlacePhotos, PlacesAllOfThemFromAnyPair) {
   Arc arc = resection_test::arc();
-  const auto begun = place_photos(arc.scene, arc.priors, arc.pairs, kPhotos);
-  ASSERT_TRUE(begun);
-  EXPECT_LT(capped_error(arc.scene), 1e-6);
+  const PlacedPhotos placed = place_photos(arc.scene, arc.priors, arc.pairs, kPhotos);
+  ASSERT_TRUE(placed.begun);
+  arc.scene = placed.scene;
+  EXPECT_EQ(placed.error, capped_error(arc.scene));
+  EXPECT_LT(placed.error, 1e-6);
   for (size_t i = 0; i < kPhotos; ++i) {
     ASSERT_TRUE(arc.scene.poses[i]) << i;
     EXPECT_LT(turn_off(arc, arc.scene, 0, i), 1e-5) << i;
@@ -74,15 +76,16 @@ TEST(PlacePhotos, PlacesAllOfThemFromAnyPair) {
 
 TEST(PlacePhotos, StopsWhereEnoughArePlacedAndGoesOnFromThere) {
   Arc arc = resection_test::arc();
-  const auto begun = place_photos(arc.scene, arc.priors, arc.pairs, 3);
-  ASSERT_TRUE(begun);
+  const PlacedPhotos three = place_photos(arc.scene, arc.priors, arc.pairs, 3);
+  ASSERT_TRUE(three.begun);
+  arc.scene = three.scene;
   const auto placed = [&] {
     return std::count_if(arc.scene.poses.begin(), arc.scene.poses.end(), [](const auto& pose) {
       return pose.has_value();
     });
   };
   EXPECT_EQ(placed(), 3);
-  place_more(arc.scene, arc.priors, *begun, kPhotos);
+  place_more(arc.scene, arc.priors, *three.begun, kPhotos);
   EXPECT_EQ(placed(), kPhotos);
   EXPECT_LT(capped_error(arc.scene), 1e-6);
 }
@@ -95,27 +98,27 @@ TEST(PlacePhotos, LeavesOutAPhotographThatFitsNowhere) {
     arc.scene.tracks[k].seen[4].at = elsewhere[2 * k + 1].head<2>();
   }
   std::erase_if(arc.pairs, [](const PhotoPair& pair) { return pair.b == 4; });
-  ASSERT_TRUE(place_photos(arc.scene, arc.priors, arc.pairs, kPhotos));
-  EXPECT_FALSE(arc.scene.poses[4]);
-  EXPECT_TRUE(arc.scene.poses[3]);
+  const PlacedPhotos placed = place_photos(arc.scene, arc.priors, arc.pairs, kPhotos);
+  EXPECT_FALSE(placed.scene.poses[4]);
+  EXPECT_TRUE(placed.scene.poses[3]);
 }
 
 TEST(PlacePhotos, PlacesNothingWithoutAPairThatMoved) {
   Arc arc = resection_test::arc();
   for (PhotoPair& pair : arc.pairs) pair.points.b = pair.points.a;
-  EXPECT_FALSE(place_photos(arc.scene, arc.priors, arc.pairs, kPhotos));
-  for (const auto& pose : arc.scene.poses) EXPECT_FALSE(pose);
+  const PlacedPhotos placed = place_photos(arc.scene, arc.priors, arc.pairs, kPhotos);
+  EXPECT_FALSE(placed.begun);
+  for (const auto& pose : placed.scene.poses) EXPECT_FALSE(pose);
 }
 
 TEST(PlacePhotos, GivesTheSameForAnyNumberOfThreads) {
-  Arc several = arc();
-  const auto begun = place_photos(several.scene, several.priors, several.pairs, kPhotos);
+  const Arc arc = resection_test::arc();
+  const PlacedPhotos several = place_photos(arc.scene, arc.priors, arc.pairs, kPhotos);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  Arc single = arc();
-  const auto begun_alone = place_photos(single.scene, single.priors, single.pairs, kPhotos);
-  ASSERT_TRUE(begun && begun_alone);
-  EXPECT_EQ(begun->first, begun_alone->first);
-  EXPECT_EQ(begun->second, begun_alone->second);
+  const PlacedPhotos single = place_photos(arc.scene, arc.priors, arc.pairs, kPhotos);
+  ASSERT_TRUE(several.begun && single.begun);
+  EXPECT_EQ(several.begun->first, single.begun->first);
+  EXPECT_EQ(several.begun->second, single.begun->second);
   for (size_t i = 0; i < kPhotos; ++i) {
     EXPECT_EQ(several.scene.poses[i]->translation, single.scene.poses[i]->translation) << i;
   }

@@ -2,7 +2,6 @@
 #include "libcgs/poses/solve_poses.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -261,28 +260,6 @@ TEST(SolvePoses, AssumesATypicalFocalLengthWhereAPlaneTellsNone) {
   const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kFocal, 0));
   EXPECT_LT(pose_errors(cameras_of(solution), scene.cameras).rotation, 0.1);
   for (const SolvedPhoto& photo : solution.photos) EXPECT_FALSE(photo.is_assumed);
-}
-
-// As of photographs by three people, or of postcards. Beginning at one focal length for all must
-// not end at a wrong one of each.
-TEST(SolvePoses, FindsTheFocalLengthsOfSeveralLenses) {
-  PointScene scene = three_views();
-  constexpr std::array<double, 3> kFocals = {620, 1500, 950};
-  for (size_t i = 0; i < kFocals.size(); ++i) {
-    Camera& camera = scene.cameras[i];
-    camera.fx = camera.fy = kFocals[i];
-    camera.world_from_cam.translation().z() *= kFocals[i] / kFocal;
-  }
-  std::vector<UnposedPhoto> photos = unposed_photos(scene);
-  for (size_t i = 0; i < photos.size(); ++i) photos[i].lens = static_cast<int>(i);
-  const PoseSolution solution = solve_poses(photos);
-  for (size_t i = 0; i < kFocals.size(); ++i) {
-    const SolvedPhoto& photo = solution.photos[i];
-    ASSERT_TRUE(photo.is_placed);
-    EXPECT_FALSE(photo.is_assumed);
-    EXPECT_LT(std::abs(std::log(photo.camera.fx / kFocals[i])), 0.05) << i;
-  }
-  EXPECT_LT(pose_errors(cameras_of(solution), scene.cameras).rotation, 0.5);
 }
 
 TEST(SolvePoses, RefusesTooLittleOverlapNamingTheBestPair) {
