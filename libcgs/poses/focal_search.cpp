@@ -56,8 +56,7 @@ PlacedPhotos attempt_from(const Reconstruction& start,
   return out;
 }
 
-// Where focal lengths are vague, what was placed at wrong ones stays in the way of the right ones:
-// begun again at those that were found, as long as that explains more.
+// Where focal lengths are vague, begun again at those that were found.
 // \param start  without lenses and places
 PlacedPhotos attempt_at(double focal_of_side,
                         Reconstruction start,
