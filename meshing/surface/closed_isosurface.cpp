@@ -56,6 +56,18 @@ void average(openvdb::FloatGrid& grid, const std::vector<Coord>& voxels) {
   }
 }
 
+// Adds the blocks that hold the voxels; false where they are there already, whole.
+bool make_fine(openvdb::BoolTree& fine, const std::vector<Coord>& voxels) {
+  bool any = false;
+  for (const Coord& at : voxels) {
+    auto* block = fine.touchLeaf(at);
+    if (block->isDense()) continue;
+    block->setValuesOn();
+    any = true;
+  }
+  return any;
+}
+
 // Shells of closed surface that smoothing has cut off: fewer faces than around a few voxels.
 TriangleMesh without_crumbs(const TriangleMesh& mesh, double voxel) {
   constexpr double kSide = 3;  // [voxels]
@@ -68,22 +80,26 @@ TriangleMesh without_crumbs(const TriangleMesh& mesh, double voxel) {
 
 }  // namespace
 
-ClosedIsosurface closed_isosurface(openvdb::FloatGrid& surface) {
+ClosedIsosurface closed_isosurface(openvdb::FloatGrid& surface, openvdb::BoolTree::Ptr fine) {
   const double voxel = surface.voxelSize()[0];
   ClosedIsosurface out;
   out.method = "level set";
   constexpr int kRounds = 8;
-  for (int round = 0; round < kRounds; ++round) {
-    out.mesh = without_crumbs(zero_surface(surface), voxel);
+  for (int round = 0; round < kRounds;) {
+    out.mesh = without_crumbs(zero_surface(surface, fine), voxel);
     out.certificate = certify(out.mesh);
     if (out.certificate.self_intersections == 0) {
       if (out.certificate.passed() || out.mesh.faces.empty()) return out;
-      break;  // Smoothing helps against nothing else.
+      if (!fine) break;  // Smoothing helps against nothing else.
+      fine = nullptr;
+      continue;
     }
     const auto voxels = voxels_around(out.mesh, self_intersections(out.mesh), voxel);
+    if (fine && make_fine(*fine, voxels)) continue;
     average(surface, voxels);
     out.voxels_smoothed += voxels.size();
     out.method = "level set, locally smoothed";
+    ++round;
   }
   out.method = "level set, marching tetrahedra";
   out.mesh = without_crumbs(zero_surface_by_tetrahedra(surface), voxel);

@@ -22,10 +22,12 @@ struct ClosedIsosurface {
 
 /// Meshes a level set that keeps one sign around its active voxels.
 ///
-/// If the mesh intersects itself, the field is averaged around these places and meshed again; what
-/// then remains is meshed by marching tetrahedra, which cannot intersect. Shells of a few voxels
-/// are left out.
+/// If the mesh intersects itself, these places are meshed finely; where they are already, the field
+/// is averaged around them and meshed again; what then remains is meshed by marching tetrahedra,
+/// which cannot intersect. Shells of a few voxels are left out.
 /// \param surface  its active voxels may be smoothed
-ClosedIsosurface closed_isosurface(openvdb::FloatGrid& surface);
+/// \param fine     as zero_surface() takes it; grows
+ClosedIsosurface closed_isosurface(openvdb::FloatGrid& surface,
+                                   openvdb::BoolTree::Ptr fine = nullptr);
 
 }  // namespace cgs

@@ -33,23 +33,17 @@ openvdb::FloatGrid::Ptr off_the_corners(const openvdb::FloatGrid& distance) {
   return grid;
 }
 
-}  // namespace
-
-TriangleMesh zero_surface(const openvdb::FloatGrid& distance) {
-  std::vector<openvdb::Vec3s> points;
-  std::vector<openvdb::Vec3I> triangles;
-  std::vector<openvdb::Vec4I> quads;
-  openvdb::tools::volumeToMesh(*off_the_corners(distance), points, triangles, quads, 0.0, 0.0);
-  TriangleMesh mesh;
-  mesh.vertices.reserve(points.size());
-  for (const auto& p : points) mesh.vertices.emplace_back(p.x(), p.y(), p.z());
-  mesh.faces.reserve(triangles.size() + 2 * quads.size());
-  // OpenVDB winds faces clockwise seen from outside.
-  for (const auto& t : triangles) mesh.faces.push_back({t[0], t[2], t[1]});
+// OpenVDB winds faces clockwise seen from outside.
+void add_faces(const openvdb::tools::PolygonPool& pool, TriangleMesh& mesh) {
   const auto squared = [&](uint32_t a, uint32_t b) {
     return (mesh.vertices[a] - mesh.vertices[b]).squaredNorm();
   };
-  for (const auto& q : quads) {
+  for (size_t i = 0; i < pool.numTriangles(); ++i) {
+    const openvdb::Vec3I& t = pool.triangle(i);
+    mesh.faces.push_back({t[0], t[2], t[1]});
+  }
+  for (size_t i = 0; i < pool.numQuads(); ++i) {
+    const openvdb::Vec4I& q = pool.quad(i);
     if (squared(q[0], q[2]) <= squared(q[1], q[3])) {
       mesh.faces.push_back({q[0], q[2], q[1]});
       mesh.faces.push_back({q[0], q[3], q[2]});
@@ -57,6 +51,25 @@ TriangleMesh zero_surface(const openvdb::FloatGrid& distance) {
       mesh.faces.push_back({q[1], q[3], q[2]});
       mesh.faces.push_back({q[1], q[0], q[3]});
     }
+  }
+}
+
+}  // namespace
+
+TriangleMesh zero_surface(const openvdb::FloatGrid& distance,
+                          const openvdb::BoolTree::ConstPtr& fine) {
+  constexpr double kFlat = 0.2;  // 1 - the cosine between normals within a block: 37 degrees
+  openvdb::tools::VolumeToMesh mesher(0, fine ? kFlat : 0);
+  if (fine) mesher.setAdaptivityMask(fine);
+  mesher(*off_the_corners(distance));
+  TriangleMesh mesh;
+  mesh.vertices.reserve(mesher.pointListSize());
+  for (size_t i = 0; i < mesher.pointListSize(); ++i) {
+    const openvdb::Vec3s& p = mesher.pointList()[i];
+    mesh.vertices.emplace_back(p.x(), p.y(), p.z());
+  }
+  for (size_t i = 0; i < mesher.polygonPoolListSize(); ++i) {
+    add_faces(mesher.polygonPoolList()[i], mesh);
   }
   return mesh;
 }

@@ -8,11 +8,14 @@ namespace cgs {
 
 /// The zero surface of a signed distance field as triangles, outward = towards positive values.
 ///
-/// Dual contouring without adaptivity: one vertex per sheet and cell, so triangles are compact.
-/// Values nearer to zero than 2 % of a voxel are moved to that distance (zero counts as outside):
-/// a surface exactly through voxel centres would give triangles without area.
+/// Dual contouring: one vertex per sheet and cell, so triangles are compact. Values nearer to zero
+/// than 2 % of a voxel are moved to that distance (zero counts as outside): a surface exactly
+/// through voxel centres would give triangles without area.
+/// \param fine  voxels whose cells each have a vertex; in flat places elsewhere, blocks of up to
+///              8 x 8 x 8 cells share one. Null = all.
 /// \return vertices and faces only [internal units].
-TriangleMesh zero_surface(const openvdb::FloatGrid& distance);
+TriangleMesh zero_surface(const openvdb::FloatGrid& distance,
+                          const openvdb::BoolTree::ConstPtr& fine = nullptr);
 
 /// The same surface by marching tetrahedra (six to a cell, around its main diagonal).
 ///

@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include <openvdb/tools/Morphology.h>
+
 #include "libcgs/core/error.h"
 #include "meshing/mesh/provenance.h"
 #include "meshing/surface/closed_isosurface.h"
@@ -29,6 +31,16 @@ void check_memory(const Volume& volume, size_t limit) {
   }
 }
 
+// Voxels that the surface was observed in, and a few around them.
+openvdb::BoolTree::Ptr observed_voxels(const Volume& volume) {
+  constexpr int kAround = 3;
+  auto out =
+      std::make_shared<openvdb::BoolTree>(volume.tsdf->tree(), false, openvdb::TopologyCopy());
+  openvdb::tools::dilateActiveValues(*out, kAround);
+  out->voxelizeActiveTiles();  // the mesher looks for blocks only
+  return out;
+}
+
 }  // namespace
 
 void WatertightOptions::validate() const {
@@ -51,7 +63,7 @@ WatertightResult watertight_surface(Volume& volume,
     volume.surface = level_set(matter, volume);
   }
   report(progress, 0.5);
-  ClosedIsosurface closed = closed_isosurface(*volume.surface);
+  ClosedIsosurface closed = closed_isosurface(*volume.surface, observed_voxels(volume));
   result.mesh = std::move(closed.mesh);
   result.certificate = closed.certificate;
   result.method = std::move(closed.method);

@@ -38,7 +38,8 @@ struct WatertightResult {
 /// Matter is what lies behind observed surface: the negative side of the band, and every voxel that
 /// is hidden in at least one view and free in none, up to the bounds. Free space and what no view
 /// says anything about are empty. Where the surface was observed it is the zero crossing of
-/// volume.tsdf; elsewhere it is invented, smooth, and labelled so.
+/// volume.tsdf; elsewhere it is invented, smooth, and labelled so. A few voxels away from what was
+/// observed, faces are large where it is flat, see zero_surface().
 ///
 /// volume.surface receives the closed level set. If the mesh of it intersects itself, the field is
 /// averaged around these places and meshed again; what then remains is meshed by marching

@@ -232,29 +232,6 @@ TEST(WatertightSurface, RefusesWhatDoesNotFitIntoMemory) {
   EXPECT_THROW(watertight_surface(fused.volume, {.memory_limit = 100000}), LimitError);
 }
 
-// Random signs are the worst a field can do; every cell configuration occurs.
-TEST(ZeroSurfaceByTetrahedra, NeverIntersectsItself) {
-  const auto grid = openvdb::FloatGrid::create(1.0f);
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.01));
-  std::mt19937 random(7);
-  auto values = grid->getAccessor();
-  for (int x = -1; x < 14; ++x) {
-    for (int y = -1; y < 14; ++y) {
-      for (int z = -1; z < 14; ++z) {
-        const bool border = std::min({x, y, z}) < 1 || std::max({x, y, z}) > 12;
-        const float noise = static_cast<float>(double(random()) / 4294967296.0) - 0.5f;
-        values.setValue(openvdb::Coord(x, y, z), border ? 1.0f : noise);
-      }
-    }
-  }
-  const Certificate c = certify(zero_surface_by_tetrahedra(*grid));
-  EXPECT_TRUE(c.closed);
-  EXPECT_TRUE(c.edge_manifold);
-  EXPECT_TRUE(c.vertex_manifold);
-  EXPECT_EQ(c.self_intersections, 0U);
-  EXPECT_GT(c.volume, 0);
-}
-
 TEST(WatertightOptions, RefusesEveryFieldOutOfRange) {
   EXPECT_NO_THROW(WatertightOptions{}.validate());
   EXPECT_THROW(WatertightOptions{.min_part = std::nan("")}.validate(), InvalidInput);
