@@ -20,6 +20,7 @@
 #include "io/bytes/mesh_arrays.h"
 #include "io/glb/texture_images.h"
 #include "io/scenes/resample.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/provenance.h"
 #include "meshing/edit/simplify.h"
 
@@ -140,6 +141,19 @@ Json gaussians_json(const Gaussians& gaussians) {
       {"count", gaussians.size()}, {"positions", base64(positions)}, {"colors", base64(colors)}};
 }
 
+// Few and large, each as wide as the middle one of its scales is to both sides of it, at their
+// median.
+Json fill_json(const Gaussians& fill) {
+  constexpr float kSigmas = 3;
+  Json out = gaussians_json(fill);
+  std::vector<float> widths;
+  for (const Eigen::Vector3f& scale : fill.scale) {
+    widths.push_back(kSigmas * (scale.sum() - scale.minCoeff() - scale.maxCoeff()));
+  }
+  out["size"] = widths.empty() ? 0 : double(quantile(widths, 0.5));
+  return out;
+}
+
 // JSON that may stand in a script element: no text in it can end the element.
 std::string inert(std::string json) {
   for (size_t at = json.find('<'); at != std::string::npos; at = json.find('<', at)) {
@@ -193,7 +207,7 @@ std::string shown_text(const ShownMesh& shown, const Frame& frame) {
   return html.str();
 }
 
-Json viewer_scene(const Model& model, const TriangleMesh& mesh) {
+Json viewer_scene(const Model& model, const TriangleMesh& mesh, const Gaussians& fill) {
   const Frame& frame = model.scene.frame;
   const FigureUnit unit = figure_unit(frame, "");
   PhotoTexture texture = texture_from_photographs(model.scene, model.priors, mesh).texture;
@@ -220,11 +234,13 @@ Json viewer_scene(const Model& model, const TriangleMesh& mesh) {
           {"mesh", mesh_json(mesh, texture)},
           {"photographs", photographs_json(mesh, texture)},
           {"cameras", cameras},
-          {"gaussians", gaussians_json(model.gaussians)}};
+          {"gaussians", gaussians_json(model.gaussians)},
+          {"fill", fill_json(fill)}};
 }
 
 std::string viewer_section(const Model& model,
                            const TriangleMesh& watertight,
+                           const Gaussians& fill,
                            const Progress& progress) {
   const PageFiles files = page_files();
   std::ostringstream html;
@@ -236,7 +252,7 @@ std::string viewer_section(const Model& model,
   }
   constexpr size_t kMostFaces = 160000;  // a page with as many is there within some 2 s
   const ShownMesh shown = shown_mesh(watertight, kMostFaces, part_of(progress, 0, 0.7));
-  const Json scene = viewer_scene(model, shown.mesh);
+  const Json scene = viewer_scene(model, shown.mesh, fill);
   html << files.viewer_markup << shown_text(shown, model.scene.frame)
        << "<script type=\"application/json\" id=viewer-scene>" << inert(json_text(scene, -1))
        << "</script>\n<script>/*\n"

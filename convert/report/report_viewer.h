@@ -31,16 +31,21 @@ ShownMesh shown_mesh(const TriangleMesh& mesh, size_t most_faces, const Progress
 std::string shown_text(const ShownMesh& shown, const Frame& frame);
 
 /// What the viewer of the report shows, as viewer.js reads it: the mesh with its evidence in the
-/// frame of the model, photographs as its texture, input cameras, a sample of the Gaussians, and
-/// how to get to the coordinates of files and the unit of figures. Arrays are base64 of
-/// little-endian numbers.
-nlohmann::ordered_json viewer_scene(const Model& model, const TriangleMesh& mesh);
+/// frame of the model, photographs as its texture, input cameras, a sample of the Gaussians, what
+/// fills their holes, and how to get to the coordinates of files and the unit of figures. Arrays
+/// are base64 of little-endian numbers.
+/// \param fill  synthetic Gaussians; may be empty
+nlohmann::ordered_json viewer_scene(const Model& model,
+                                    const TriangleMesh& mesh,
+                                    const Gaussians& fill = {});
 
 /// The section of the report page with the viewer and all it needs, as HTML: no other file, no
 /// network. Without three.js at build time, a sentence that says so.
 /// \param watertight  in the frame of the model; not empty
+/// \param fill        as viewer_scene() takes it
 std::string viewer_section(const Model& model,
                            const TriangleMesh& watertight,
+                           const Gaussians& fill,
                            const Progress& progress);
 
 }  // namespace cgs

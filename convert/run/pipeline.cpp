@@ -257,12 +257,19 @@ Json report_json(const Run& run) {
   return out;
 }
 
+// What fills the holes of the splats for browsers.
+Gaussians web_fill(const Run& run) {
+  if (!result_of(run, Stage::Splats).contains("fill")) return {};
+  return read_web_fill(run.request.output / "web", run.model->scene.frame);
+}
+
 StageResult run_report(Run& run, const Progress& progress) {
   loaded_model(run);
   report(progress, 0);
   const Json json = report_json(run);
   write_file(run.request.output / "report.json", json_text(versioned(json)) + "\n");
-  const std::string viewer = viewer_section(loaded_model(run), loaded_mesh(run), progress);
+  const std::string viewer =
+      viewer_section(loaded_model(run), loaded_mesh(run), web_fill(run), progress);
   write_html_report(run.request.output, json, run.model->scene, viewer);
   return {Json{{"pages", 1}}};
 }

@@ -11,8 +11,10 @@
 #include "io/bytes/atomic_file.h"
 #include "io/scenes/scene_reader.h"
 #include "io/splats/splat_glb.h"
+#include "io/splats/splat_reader.h"
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/splat_selection.h"
 #include "libcgs/core/up_axis.h"
 #include "libcgs/priors/water.h"
 #include "libcgs/splats/splat_merging.h"
@@ -142,6 +144,13 @@ WebSplats write_web_splats(const std::filesystem::path& folder,
   } catch (const InvalidInput& error) {
     out.spz_left_out = error.what();
   }
+  return out;
+}
+
+Gaussians read_web_fill(const std::filesystem::path& folder, const Frame& frame) {
+  Gaussians out = read_splats(folder / "splats.glb", frame).gaussians;
+  if (out.synthetic.empty()) return {};
+  keep_only(out, std::vector<uint8_t>(out.synthetic));
   return out;
 }
 

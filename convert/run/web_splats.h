@@ -64,4 +64,9 @@ WebSplats write_web_splats(const std::filesystem::path& folder,
                            const WebSplatsOptions& options = {},
                            const Progress& progress = {});
 
+/// What was painted into the holes, as splats.glb holds it: WebFill::splats.
+/// \param frame  of the model
+/// \throws BadInput as read_splats()
+Gaussians read_web_fill(const std::filesystem::path& folder, const Frame& frame);
+
 }  // namespace cgs

@@ -103,9 +103,9 @@ function viewerScene(scene, changed) {
     const points = scene.gaussians.positions.length / 16;  // 12 bytes each, in base64
     return 1.5 * Math.sqrt(area / Math.max(1, points));
   }
-  function cloudMaterial() {
+  function cloudMaterial(size) {
     return new THREE.ShaderMaterial({
-      uniforms: { clip, size: { value: pointSize() }, pixelsPerTangent },
+      uniforms: { clip, size: { value: size }, pixelsPerTangent },
       vertexShader: `
         attribute vec3 paint;
         uniform float size, pixelsPerTangent;
@@ -184,13 +184,15 @@ function viewerScene(scene, changed) {
     return new THREE.Matrix4().set(...shot.world_from_cam, 0, 0, 0, 1);
   }
 
-  const cloud = (() => {
+  function cloudOf(gaussians, size) {
     const geometry = new THREE.BufferGeometry();
-    const places = floats(scene.gaussians.positions);
+    const places = floats(gaussians.positions);
     geometry.setAttribute('position', new THREE.BufferAttribute(places, 3));
-    geometry.setAttribute('paint', new THREE.BufferAttribute(bytes(scene.gaussians.colors), 3, true));
-    return new THREE.Points(geometry, cloudMaterial());
-  })();
+    geometry.setAttribute('paint', new THREE.BufferAttribute(bytes(gaussians.colors), 3, true));
+    return new THREE.Points(geometry, cloudMaterial(size));
+  }
+  const cloud = cloudOf(scene.gaussians, pointSize());
+  const fill = cloudOf(scene.fill, scene.fill.size);
 
   // ---- What it answers ----------------------------------------------------------------------
 
@@ -243,7 +245,7 @@ function viewerScene(scene, changed) {
   return {
     vertices, faces, vertexColors, sigmas, provenance, statesLabels, corners,
     vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt, sigmaAlong,
-    surface, paint, cloud, clip, withInvented, lit, textured, pixelsPerTangent,
+    surface, paint, cloud, fill, clip, withInvented, lit, textured, pixelsPerTangent,
     isComplete: () => pending === 0,
   };
 }

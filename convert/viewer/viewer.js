@@ -18,7 +18,7 @@
   const {
     vertices, faces, vertexColors, sigmas, provenance, statesLabels, corners,
     vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt, sigmaAlong,
-    surface, paint, cloud, clip, withInvented, lit, textured, pixelsPerTangent, isComplete,
+    surface, paint, cloud, fill, clip, withInvented, lit, textured, pixelsPerTangent, isComplete,
   } = viewerScene(scene, () => redraw());
 
   const renderer = new THREE.WebGLRenderer({ canvas, context, antialias: true, alpha: true });
@@ -30,8 +30,8 @@
   const between = new THREE.Line(
     new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]),
     new THREE.LineBasicMaterial({ color: 0xf21ad9, depthTest: false, transparent: true }));
-  for (const object of [surface, cloud, between]) object.frustumCulled = false;
-  world.add(surface, cloud, between);
+  for (const object of [surface, cloud, fill, between]) object.frustumCulled = false;
+  world.add(surface, cloud, fill, between);
 
   // ---- The camera ---------------------------------------------------------------------------
 
@@ -214,6 +214,8 @@
     explain(unknownColor, 'unknown: inferred or estimated, nothing measured it');
   }
 
+  const fillHoles = part('fill');
+  const isFilled = () => scene.fill.count > 0 && fillHoles.getAttribute('aria-pressed') === 'true';
   const looks = [
     { name: 'Photographs', there: scene.photographs.length > 0, lit: 0, textured: 1, paint: colorOfVertex,
       explain: () => legend.append('Every face shows the photograph that sees it best; what none shows has the colours around it.') },
@@ -224,12 +226,15 @@
     { name: 'Sigma', there: sigmas.length > 0, lit: 0.5, explain: explainSigma,
       paint: (c) => (statesSigma(Math.floor(c / 3)) ? rampColor(onSigmaScale(sigmas[faces[c]])) : unknownColor) },
     { name: 'Gaussians', there: scene.gaussians.count > 0, points: true,
-      explain: () => legend.append(`${cloud.geometry.attributes.position.count} of ${scene.gaussians.count} Gaussians, as points of their colour, all of one size and opaque. Measuring needs the surface.`) },
+      explain: () => legend.append(`${cloud.geometry.attributes.position.count} of ${scene.gaussians.count} Gaussians, as points of their colour, all of one size and opaque. Measuring needs the surface.` +
+        (isFilled() ? ` Their holes are filled with ${scene.fill.count} synthetic ones, which no photograph shows.` : '')) },
   ].filter((look) => look.there);
 
   function show(look) {
     surface.visible = !look.points;
     cloud.visible = !surface.visible;
+    fill.visible = cloud.visible && isFilled();
+    fillHoles.hidden = surface.visible || scene.fill.count === 0;
     lit.value = look.lit || 0;
     textured.value = look.textured || 0;
     if (look.paint) paintEach(look.paint);
@@ -370,6 +375,13 @@
     redraw();
   });
 
+  // ---- Holes of the Gaussians, filled and not -----------------------------------------------
+
+  fillHoles.addEventListener('click', () => {
+    fillHoles.setAttribute('aria-pressed', !isFilled());
+    show(looks.find((look) => look.points));
+  });
+
   // ---- Mouse, touch and keys ----------------------------------------------------------------
 
   let pressed = null;
@@ -390,6 +402,7 @@
     ArrowUp: () => turn(0, -STEP), ArrowDown: () => turn(0, STEP),
     '+': () => zoom(0.9), '=': () => zoom(0.9), '-': () => zoom(1 / 0.9),
     Enter: () => pick(0, 0), Escape: clearEnds, h: () => invented.click(),
+    f: () => { if (!fillHoles.hidden) fillHoles.click(); },
   };
   canvas.addEventListener('keydown', (event) => {
     const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];

@@ -46,7 +46,7 @@ def setUpModule():
     crop_and_stretch(capture, 'view_02')
     # Metres that are not the units of the files, so that no figure is right by chance.
     subprocess.run([CGS, 'run', capture, '--views', 'view_01,view_02,view_03', '--assume-unit', 'ft',
-                    '--set', 'steps=0', '--voxel-size', '3cm', '-q', '-o', OUT], check=True)
+                    '--set', 'steps=0', '--voxel-size', '3cm', '--fill', '-q', '-o', OUT], check=True)
 
 
 def crop_and_stretch(capture, name):
@@ -126,6 +126,9 @@ class Page:
 
     def measured(self):
         return self.driver.find_element(By.ID, 'viewer-measured').text
+
+    def legend(self):
+        return self.driver.find_element(By.ID, 'viewer-legend').text
 
     def severe(self):
         return [entry for entry in self.driver.get_log('browser') if entry['level'] == 'SEVERE']
@@ -210,6 +213,26 @@ class ReportPage(unittest.TestCase):
                     self.assertGreater(changed(pictures[other], pictures[look]), 0.1, (other, look))
         self.assertGreater(share_of_magenta(pictures['Provenance']), 0.01)
         self.assertEqual(share_of_magenta(pictures['Photographs']), 0)
+
+    def test_holes_of_the_gaussians_are_filled_at_a_switch(self):
+        holes = self.page.driver.find_element(By.ID, 'viewer-fill')
+        self.assertFalse(holes.is_displayed())
+        self.page.press('view_02')
+        self.page.press('Gaussians')
+        canvas = self.page.canvas()
+        canvas.send_keys(Keys.ESCAPE)  # the focus is drawn, too
+        filled = self.page.picture()
+        self.assertRegex(self.page.legend(), r'filled with \d+ synthetic')
+        self.page.driver.save_screenshot(str(SCREENS / 'filled.png'))
+        canvas.send_keys('f')
+        self.assertGreater(changed(filled, self.page.picture()), 0.01)
+        self.assertNotIn('synthetic', self.page.legend())
+        canvas.send_keys('F')
+        self.assertEqual(changed(filled, self.page.picture()), 0)
+        self.page.press('Holes filled')
+        self.assertEqual(holes.get_attribute('aria-pressed'), 'false')
+        self.assertNotIn('synthetic', self.page.legend())
+        self.page.press('Holes filled')
 
     def test_shows_from_its_place_what_the_photograph_shows(self):
         shot = camera('view_02')

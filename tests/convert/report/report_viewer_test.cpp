@@ -137,6 +137,19 @@ TEST(ViewerScene, SaysHowToGetToFilesAndFigures) {
   EXPECT_EQ(scene["gaussians"]["count"], 2);
   EXPECT_EQ(array_of<float>(scene["gaussians"]["positions"]), (std::vector<float>{0.25f, 0, 0}));
   EXPECT_EQ(array_of<uint8_t>(scene["gaussians"]["colors"]), (std::vector<uint8_t>{255, 128, 0}));
+  EXPECT_EQ(scene["fill"]["count"], 0);
+}
+
+TEST(ViewerScene, HasWhatFillsHolesBesideTheGaussians) {
+  const test::TempDir dir;
+  const Model model = small_model(dir);
+  Gaussians fill = model.gaussians;
+  fill.position[0] = {0, 0, 0.75f};
+  const Json scene = viewer_scene(model, labelled_box(), fill);
+  EXPECT_EQ(scene["fill"]["count"], 2);
+  EXPECT_EQ(array_of<float>(scene["fill"]["positions"]), (std::vector<float>{0, 0, 0.75f}));
+  EXPECT_FLOAT_EQ(scene["fill"]["size"].get<float>(), 0.03f);
+  EXPECT_EQ(array_of<float>(scene["gaussians"]["positions"]), (std::vector<float>{0.25f, 0, 0}));
 }
 
 TEST(ViewerScene, GoesWithoutPhotographsThatAreGone) {
@@ -152,7 +165,7 @@ TEST(ViewerScene, GoesWithoutPhotographsThatAreGone) {
 TEST(ViewerSection, IsOneElementThatNoNameCanLeave) {
   const test::TempDir dir;
   if (page_files().three.empty()) GTEST_SKIP() << "built without three.js";
-  const std::string html = viewer_section(small_model(dir), labelled_box(), {});
+  const std::string html = viewer_section(small_model(dir), labelled_box(), {}, {});
   size_t ends = 0;
   for (size_t at = html.find("</script"); at != std::string::npos;
        at = html.find("</script", at + 1))

@@ -60,8 +60,15 @@ TEST(WriteWebSplats, FillsHolesWithSplatsThatAreTagged) {
   EXPECT_NE(file.evidence.find(std::to_string(count) + " synthetic"), std::string::npos);
   EXPECT_EQ(web_splats_to_json(made)["fill"]["splats"], count);
 
+  const Gaussians fill = read_web_fill(dir.path(), model.scene.frame);
+  ASSERT_EQ(fill.size(), count);
+  for (size_t i = 0; i < count; ++i) {
+    ASSERT_LT((fill.position[i] - made.fill->splats.position[i]).norm(), 1e-5f);
+  }
+
   write_web_splats(dir.path(), model);
   EXPECT_EQ(synthetic_count(read_splats(dir / "splats.glb").gaussians), 0u);
+  EXPECT_EQ(read_web_fill(dir.path(), model.scene.frame).size(), 0u);
   EXPECT_FALSE(std::filesystem::exists(dir / "surroundings"));
 }
 
