@@ -235,7 +235,8 @@ std::string focal_text(const UnposedPhoto& photo, const SolvedPhoto& solved) {
            std::to_string(std::lround(solved.camera.fx)) +
            " pixels are assumed, as is typical of cameras, uncertain by " +
            percent(solved.focal_sigma) +
-           ": depth may be stretched by as much; --focal states it, in pixels";
+           ": depth may be stretched by as much; --focal states it, in pixels, if one camera "
+           "took all photographs";
   }
   return "focal length of " + printable(photo.name) +
          " solved for: " + std::to_string(std::lround(solved.camera.fx)) +

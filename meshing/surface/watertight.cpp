@@ -31,11 +31,14 @@ void check_memory(const Volume& volume, size_t limit) {
   }
 }
 
-// Voxels that the surface was observed in, and a few around them.
+// Voxels that the surface was observed in, and a few around them. Only around the closed surface:
+// what a file says of the rest may be of any size.
+// \pre volume.surface is made
 openvdb::BoolTree::Ptr observed_voxels(const Volume& volume) {
   constexpr int kAround = 3;
   auto out =
-      std::make_shared<openvdb::BoolTree>(volume.tsdf->tree(), false, openvdb::TopologyCopy());
+      std::make_shared<openvdb::BoolTree>(volume.surface->tree(), false, openvdb::TopologyCopy());
+  out->topologyIntersection(volume.tsdf->tree());
   openvdb::tools::dilateActiveValues(*out, kAround);
   out->voxelizeActiveTiles();  // the mesher looks for blocks only
   return out;
