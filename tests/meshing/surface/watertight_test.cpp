@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/surface/watertight.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -8,6 +9,7 @@
 
 #include "libcgs/core/error.h"
 #include "meshing/mesh/mesh_distance.h"
+#include "meshing/mesh/provenance.h"
 #include "meshing/surface/isosurface.h"
 #include "meshing/volume/tsdf.h"
 #include "tests/support/depth_scenes.h"
@@ -138,6 +140,21 @@ TEST(WatertightSurface, KeepsTheObservedSurfaceWhereItWas) {
   const auto moved = statistics(distances_to(closed.mesh, sample_surface(open, 20000)));
   EXPECT_LT(moved.median, 1e-3 * fused.report.voxel_size);
   EXPECT_LT(moved.p95, 0.05 * fused.report.voxel_size);
+}
+
+TEST(WatertightSurface, HasLargerFacesOnlyWhereItIsInvented) {
+  auto fused = fuse(views_of(sphere_before_wall(), kThreeEyes), {});
+  const TriangleMesh closed = watertight_surface(fused.volume, {}).mesh;
+  TriangleMesh fine = zero_surface(*fused.volume.surface);
+  label_faces(fine, annotate_vertices(fine, fused.volume), 16 * double(fused.volume.voxel_size));
+  const auto count = [](const TriangleMesh& mesh, Provenance label) {
+    return std::count(mesh.provenance.begin(), mesh.provenance.end(), label);
+  };
+  EXPECT_GT(count(fine, Provenance::Observed), 1000);
+  for (const Provenance label : {Provenance::Observed, Provenance::SingleView}) {
+    EXPECT_EQ(count(closed, label), count(fine, label));
+  }
+  EXPECT_LT(count(closed, Provenance::Inferred), count(fine, Provenance::Inferred));
 }
 
 TEST(WatertightSurface, IsBoundedByWhatTheViewsAllow) {
