@@ -84,7 +84,9 @@ ClosedIsosurface closed_isosurface(openvdb::FloatGrid& surface, openvdb::BoolTre
   const double voxel = surface.voxelSize()[0];
   ClosedIsosurface out;
   out.method = "level set";
+  constexpr int kRefined = 4;  // times; what then still cuts itself had better be fine at once
   constexpr int kRounds = 8;
+  int refined = 0;
   for (int round = 0; round < kRounds;) {
     out.mesh = without_crumbs(zero_surface(surface, fine), voxel);
     out.certificate = certify(out.mesh);
@@ -95,7 +97,10 @@ ClosedIsosurface closed_isosurface(openvdb::FloatGrid& surface, openvdb::BoolTre
       continue;
     }
     const auto voxels = voxels_around(out.mesh, self_intersections(out.mesh), voxel);
-    if (fine && make_fine(*fine, voxels)) continue;
+    if (fine && make_fine(*fine, voxels)) {
+      if (++refined == kRefined) fine = nullptr;
+      continue;
+    }
     average(surface, voxels);
     out.voxels_smoothed += voxels.size();
     out.method = "level set, locally smoothed";
