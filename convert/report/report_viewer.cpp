@@ -141,8 +141,7 @@ Json gaussians_json(const Gaussians& gaussians) {
       {"count", gaussians.size()}, {"positions", base64(positions)}, {"colors", base64(colors)}};
 }
 
-// Few and large, each as wide as the middle one of its scales is to both sides of it, at their
-// median.
+// Few and large: drawn as wide as they are in the median, of the middle one of their scales.
 Json fill_json(const Gaussians& fill) {
   constexpr float kSigmas = 3;
   Json out = gaussians_json(fill);
@@ -150,7 +149,7 @@ Json fill_json(const Gaussians& fill) {
   for (const Eigen::Vector3f& scale : fill.scale) {
     widths.push_back(kSigmas * (scale.sum() - scale.minCoeff() - scale.maxCoeff()));
   }
-  out["size"] = widths.empty() ? 0 : double(quantile(widths, 0.5));
+  out["size"] = widths.empty() ? 0 : double(median(widths));
   return out;
 }
 

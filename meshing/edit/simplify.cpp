@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "libcgs/core/error.h"
 #include "meshing/edit/edge_collapse.h"
 #include "meshing/edit/stitching.h"
+#include "meshing/mesh/components.h"
 #include "meshing/mesh/halfedges.h"
 #include "meshing/mesh/provenance.h"
 #include "meshing/mesh/self_intersections.h"
@@ -165,22 +165,6 @@ class NewIntersections {
   std::vector<PairPlaces> given_;  // of the input, ascending
 };
 
-// Faces that share a corner with one of these, those themselves among them; ascending.
-std::vector<uint32_t> touching(const TriangleMesh& mesh, const std::vector<uint32_t>& faces) {
-  std::vector<uint8_t> corner(mesh.vertices.size(), 0);
-  for (const uint32_t f : faces) {
-    for (const uint32_t v : mesh.faces[f]) corner[v] = 1;
-  }
-  std::vector<uint32_t> out;
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    const auto& face = mesh.faces[f];
-    if (std::any_of(face.begin(), face.end(), [&](uint32_t v) { return corner[v] != 0; })) {
-      out.push_back(f);
-    }
-  }
-  return out;
-}
-
 // Holds input vertices nearer to the result than in the last round.
 class Tightening {
  public:
@@ -190,23 +174,17 @@ class Tightening {
   void input_face(const TriangleMesh& input, uint32_t f) {
     for (const uint32_t v : input.faces[f]) marked_[v] = 1;
   }
-  // The input vertices near a face of the result, or near a neighbour of it if it has none.
-  void output_faces(const CollapsedMesh& output, const std::vector<uint32_t>& faces) {
-    const size_t count = output.mesh.faces.size();
-    std::vector<uint8_t> has_witness(count, 0);
+  // The input vertices near a marked face of the result, or near a neighbour of it if it has none.
+  void output_faces(const CollapsedMesh& output, std::vector<uint8_t> bad) {
+    std::vector<uint8_t> lone = bad;
     for (const uint32_t f : output.witness_of) {
-      if (f < count) has_witness[f] = 1;
+      if (f < lone.size()) lone[f] = 0;
     }
-    std::vector<uint32_t> lone;
-    std::copy_if(faces.begin(), faces.end(), std::back_inserter(lone), [&](uint32_t f) {
-      return has_witness[f] == 0;
-    });
-    std::vector<uint8_t> bad(count, 0);
-    for (const uint32_t f : faces) bad[f] = 1;
-    for (const uint32_t f : touching(output.mesh, lone)) bad[f] = 1;
+    grow_over_vertices(output.mesh, lone);
+    for (size_t f = 0; f < bad.size(); ++f) bad[f] |= lone[f];
     for (size_t v = 0; v < marked_.size(); ++v) {
       const uint32_t f = output.witness_of[v];
-      if (f < count && bad[f] != 0) marked_[v] = 1;
+      if (f < bad.size() && bad[f] != 0) marked_[v] = 1;
     }
   }
   /// \return how many vertices changed.
@@ -283,14 +261,17 @@ SimplifyResult simplify_connected(const TriangleMesh& mesh,
     if (tighten_for_area(mesh, result, options.max_area_change, limits.tolerance)) continue;
     Tightening tightening(limits.tolerance, options.max_error / 32);
     // What cuts itself may do so for what its neighbours did.
-    std::vector<uint32_t> bad = touching(out.mesh, intersections.faces_of(out.mesh));
+    std::vector<uint8_t> bad(out.mesh.faces.size(), 0);
+    for (const uint32_t f : intersections.faces_of(out.mesh)) bad[f] = 1;
+    grow_over_vertices(out.mesh, bad);
     if (!to_input) to_input.emplace(mesh);
     const Measured forth = measure(out.mesh, *to_input, options, part(0.7, 0.8));
     const Measured back = measure(mesh, DistanceToMesh(out.mesh), options, part(0.8, 1));
-    bad.insert(bad.end(), forth.too_far.begin(), forth.too_far.end());
-    if (!bad.empty()) tightening.output_faces(out, bad);
+    for (const uint32_t f : forth.too_far) bad[f] = 1;
+    const bool is_bad = std::find(bad.begin(), bad.end(), uint8_t{1}) != bad.end();
+    if (is_bad) tightening.output_faces(out, std::move(bad));
     for (const uint32_t f : back.too_far) tightening.input_face(mesh, f);
-    if (bad.empty() && back.too_far.empty()) {
+    if (!is_bad && back.too_far.empty()) {
       result.mesh = std::move(out.mesh);
       result.faces_after = result.mesh.faces.size();
       result.evidence = {forth.evidence, back.evidence};

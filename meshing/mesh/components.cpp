@@ -52,6 +52,19 @@ MeshComponents components(const TriangleMesh& mesh) {
   return out;
 }
 
+void grow_over_vertices(const TriangleMesh& mesh, std::vector<uint8_t>& faces) {
+  std::vector<uint8_t> touched(mesh.vertices.size(), 0);
+  for (size_t f = 0; f < faces.size(); ++f) {
+    if (faces[f] == 0) continue;
+    for (const uint32_t v : mesh.faces[f]) touched[v] = 1;
+  }
+  for (size_t f = 0; f < faces.size(); ++f) {
+    for (const uint32_t v : mesh.faces[f]) {
+      if (touched[v] != 0) faces[f] = 1;
+    }
+  }
+}
+
 TriangleMesh with_faces(const TriangleMesh& mesh, const std::vector<uint8_t>& keep) {
   assert(keep.size() == mesh.faces.size());
   TriangleMesh out;

@@ -17,6 +17,10 @@ struct MeshComponents {
 
 MeshComponents components(const TriangleMesh& mesh);
 
+/// Marks the faces that share a vertex with one that is marked, too.
+/// \param faces  a mark per face: 1 or 0
+void grow_over_vertices(const TriangleMesh& mesh, std::vector<uint8_t>& faces);
+
 /// The mesh with only the faces where `keep` is set; unused vertices go, all attributes stay.
 ///
 /// \pre keep is as long as mesh.faces.

@@ -144,20 +144,6 @@ std::vector<uint8_t> faces_in_the_way(const TriangleMesh& mesh) {
   return out;
 }
 
-// And the faces around these, over vertices.
-void grow(const TriangleMesh& mesh, std::vector<uint8_t>& faces) {
-  std::vector<uint8_t> touched(mesh.vertices.size(), 0);
-  for (size_t f = 0; f < faces.size(); ++f) {
-    if (faces[f] == 0) continue;
-    for (const uint32_t v : mesh.faces[f]) touched[v] = 1;
-  }
-  for (size_t f = 0; f < faces.size(); ++f) {
-    for (const uint32_t v : mesh.faces[f]) {
-      if (touched[v] != 0) faces[f] = 1;
-    }
-  }
-}
-
 TriangleMesh cut_and_filled(TriangleMesh mesh) {
   constexpr int kRounds = 8;
   constexpr double kMost = 0.05;  // of the area, in all rounds together
@@ -166,7 +152,7 @@ TriangleMesh cut_and_filled(TriangleMesh mesh) {
   for (int round = 0; round < kRounds; ++round) {
     std::vector<uint8_t> drop = faces_in_the_way(mesh);
     if (std::count(drop.begin(), drop.end(), uint8_t(1)) == 0) break;
-    for (int ring = 0; ring < round; ++ring) grow(mesh, drop);
+    for (int ring = 0; ring < round; ++ring) grow_over_vertices(mesh, drop);
     std::vector<uint8_t> keep(drop.size());
     for (size_t f = 0; f < keep.size(); ++f) keep[f] = drop[f] == 0 ? 1 : 0;
     const TriangleMesh rest = put_right(with_faces(mesh, keep), Small::Anything);

@@ -24,6 +24,15 @@ TEST(Components, AreNumberedByTheirFirstFaceAndMeasured) {
   EXPECT_NEAR(parts.area[1], 0.005, 1e-8);
 }
 
+TEST(GrowOverVertices, TakesNeighboursAndNotTheirs) {
+  TriangleMesh strip;
+  strip.vertices.resize(7);
+  strip.faces = {{0, 1, 2}, {2, 3, 4}, {4, 5, 6}};  // each touches the next at a corner
+  std::vector<uint8_t> faces = {1, 0, 0};
+  grow_over_vertices(strip, faces);
+  EXPECT_EQ(faces, (std::vector<uint8_t>{1, 1, 0}));
+}
+
 TEST(WithoutSmallComponents, KeepsAttributesOfWhatStays) {
   const TriangleMesh mesh = without_small_components(big_and_small(), 0.02);
   ASSERT_EQ(mesh.faces.size(), 1U);
