@@ -12,6 +12,7 @@
 #include "libcgs/core/nan.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/directions.h"
+#include "libcgs/priors/empty_space.h"
 
 namespace cgs {
 
@@ -28,61 +29,6 @@ struct Filled {
   float inverse_depth = kNaN;
   float spread = 0;    // of the evidence [1 / internal units]
   float distance = 0;  // to the nearest evidence [pixels]
-};
-
-// Whether a witness sees past points of a view.
-class EmptySpace {
- public:
-  EmptySpace(const Camera& camera, const CompletionWitness& witness)
-      : camera_(camera), witness_(witness) {
-    const Eigen::Isometry3d to = witness.camera->cam_from_world() * camera.world_from_cam;
-    turn_ = (witness.camera->intrinsics() * to.rotation()).cast<float>();
-    shift_ = (witness.camera->intrinsics() * to.translation()).cast<float>();
-  }
-
-  bool holds(int x, int y, float inverse_depth) const {
-    return is_all_around(x, y, inverse_depth, [&](int i, int j, float depth) {
-      const ViewPriors& priors = *witness_.priors;
-      if (priors.origin(i, j) == DepthOrigin::Sky) return true;
-      if (priors.origin(i, j) != DepthOrigin::Measured) return false;
-      const float margin = std::max(kMargin * priors.depth(i, j), kSigmas * priors.sigma(i, j));
-      return priors.depth(i, j) > depth + margin;
-    });
-  }
-
- private:
-  static constexpr float kMargin = 0.03f;  // of the depth
-  static constexpr float kSigmas = 3;
-
-  // Whether is_past(i, j, depth) holds of the four pixels of the witness around a point; one alone
-  // may differ next to a depth edge.
-  template <typename IsPast>
-  bool is_all_around(int x, int y, float inverse_depth, const IsPast& is_past) const {
-    const Eigen::Vector3f ray = camera_.ray_in_cam(x + 0.5, y + 0.5).cast<float>();
-    const Eigen::Vector3f h = turn_ * ray + inverse_depth * shift_;  // z = ratio of the depths
-    if (!(h.z() > 0)) return false;
-    const float u = h.x() / h.z() - 0.5f;
-    const float v = h.y() / h.z() - 0.5f;
-    const ViewPriors& priors = *witness_.priors;
-    if (!(u >= 0 && v >= 0 && u <= static_cast<float>(priors.depth.width - 1) &&
-          v <= static_cast<float>(priors.depth.height - 1))) {
-      return false;
-    }
-    const float depth = h.z() / inverse_depth;
-    const int x0 = static_cast<int>(u);
-    const int y0 = static_cast<int>(v);
-    for (int j = y0; j <= std::min(y0 + 1, priors.depth.height - 1); ++j) {
-      for (int i = x0; i <= std::min(x0 + 1, priors.depth.width - 1); ++i) {
-        if (!is_past(i, j, depth)) return false;
-      }
-    }
-    return true;
-  }
-
-  const Camera& camera_;
-  const CompletionWitness& witness_;
-  Eigen::Matrix3f turn_;
-  Eigen::Vector3f shift_;
 };
 
 class Completion {

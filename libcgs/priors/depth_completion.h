@@ -5,6 +5,7 @@
 
 #include "libcgs/core/progress.h"
 #include "libcgs/core/scene.h"
+#include "libcgs/priors/empty_space.h"
 #include "libcgs/priors/view_priors.h"
 
 namespace cgs {
@@ -21,12 +22,6 @@ struct DepthCompletionOptions {
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
-};
-
-/// Another view as a witness of empty space: nothing stands before what it measured.
-struct CompletionWitness {
-  const Camera* camera = nullptr;      ///< Not owned; must outlive the call.
-  const ViewPriors* priors = nullptr;  ///< Likewise. Only measured pixels and sky speak.
 };
 
 /// Gives every valid pixel a finite depth, but not sky, nor what would stand in the way of a

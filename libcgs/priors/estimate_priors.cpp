@@ -7,7 +7,9 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/priors/background.h"
+#include "libcgs/priors/continued_planes.h"
 #include "libcgs/priors/guessed_depth.h"
+#include "libcgs/priors/measured_planes.h"
 #include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/sky.h"
 #include "libcgs/priors/transients.h"
@@ -93,7 +95,7 @@ class Estimator {
       enter_guess(guesses[i], out_.views[i]);
     }
     set_backdrop(out_.views);
-    for (size_t i = 0; i < out_.views.size(); ++i) tell_evidence(i);
+    tell_evidence();
     const std::vector<UnmeasuredShares> why = unmeasured_shares(scene_, out_.views);
     for (size_t i = 0; i < why.size(); ++i) out_.report.coverage[i].unmeasured = why[i];
     forget_unmeasured();
@@ -104,13 +106,24 @@ class Estimator {
  private:
   // Only when all views are completed: those before another are its witnesses as they were
   // measured.
-  void tell_evidence(size_t i) {
-    ViewPriors& priors = out_.views[i];
-    limit_completion(priors);
-    const Raster<DepthOrigin> filled = priors.origin;
-    mark_estimated(priors, view(i), options_.adjoining);
-    out_.report.coverage.push_back(coverage(filled, priors.origin, view(i)));
-    priors.layer = depth_layers(priors.depth, options_.layers);
+  void tell_evidence() {
+    std::vector<Raster<DepthOrigin>> filled;
+    for (size_t i = 0; i < out_.views.size(); ++i) {
+      limit_completion(out_.views[i]);
+      filled.push_back(out_.views[i].origin);
+      mark_estimated(out_.views[i], view(i), options_.adjoining);
+    }
+    continue_planes(scene_, measured_planes(scene_, out_.views), out_.views);
+    for (size_t i = 0; i < out_.views.size(); ++i) {
+      ViewPriors& priors = out_.views[i];
+      for (size_t k = 0; k < filled[i].data.size(); ++k) {
+        const bool is_continued = filled[i].data[k] == DepthOrigin::Unknown &&
+                                  priors.origin.data[k] == DepthOrigin::Estimated;
+        if (is_continued) filled[i].data[k] = DepthOrigin::Completed;
+      }
+      out_.report.coverage.push_back(coverage(filled[i], priors.origin, view(i)));
+      priors.layer = depth_layers(priors.depth, options_.layers);
+    }
   }
 
   // A view of which nothing was measured says nothing of the scene: filled in, it would be a
