@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
+#include "libcgs/core/angle_between.h"
 #include "libcgs/poses/resection.h"
 
 namespace cgs {
@@ -59,6 +61,37 @@ double share_on_planes(const std::vector<PhotoPair>& pairs) {
     all += is_inlier.size();
   }
   return all > 0 ? double(on_plane) / double(all) : 0;
+}
+
+// Whether the axes of two placed photographs are further apart than 60 degrees and than either
+// picture is wide. Nothing would look alike in both.
+bool look_apart(const Reconstruction& scene,
+                const std::vector<LensPrior>& priors,
+                const PhotoPair& pair) {
+  constexpr double kMost = std::numbers::pi / 3;
+  const auto axis = [&](int photo) {
+    return scene.pose(photo)->rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  };
+  const auto width = [&](int photo) {
+    const LensPrior& prior = priors[static_cast<size_t>(scene.lens_of[static_cast<size_t>(photo)])];
+    return 2 * std::atan(prior.side / 2 / scene.lens(photo).focal);
+  };
+  return angle_between(axis(pair.a), axis(pair.b)) >
+         std::max({kMost, width(pair.a), width(pair.b)});
+}
+
+// Whether half or more of the photographs that share something would look apart.
+bool is_turned_away(const Reconstruction& scene,
+                    const std::vector<LensPrior>& priors,
+                    const std::vector<PhotoPair>& pairs) {
+  size_t apart = 0;
+  size_t all = 0;
+  for (const PhotoPair& pair : pairs) {
+    if (!pair.is_connected || !scene.pose(pair.a) || !scene.pose(pair.b)) continue;
+    ++all;
+    apart += look_apart(scene, priors, pair) ? 1 : 0;
+  }
+  return apart > 0 && 2 * apart >= all;
 }
 
 }  // namespace
@@ -127,6 +160,10 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
   if (double(known) < std::max(kLeastShare * double(all), 12.0)) {
     throw NumericalError(unexplained_matches(photos, pairs) + " (" + std::to_string(known) +
                          " of " + std::to_string(all) + " points fit)");
+  }
+  if (is_turned_away(scene, priors, pairs)) {
+    throw NumericalError(unexplained_matches(photos, pairs) +
+                         " (those that fit best look in quite different directions)");
   }
   constexpr double kMostSigma = 0.1;
   constexpr double kShortest = 0.32;  // [larger sides] phones' widest lenses have 0.36,

@@ -23,8 +23,9 @@ void refuse_turned_only(const std::vector<UnposedPhoto>& photos,
                         const std::vector<LensPrior>& priors,
                         const std::vector<PhotoPair>& pairs);
 
-/// \throws NumericalError if a focal length of which nothing was known is not determined, or most matches
-///         disagree with the solution.
+/// \throws NumericalError if a focal length of which nothing was known is not determined, most
+///         matches disagree with the solution, or half of the photographs that share something look
+///         in directions so far apart that they could not.
 /// \param focal_sigmas  per lens, as from adjust_bundle()
 void refuse_unsure(const std::vector<UnposedPhoto>& photos,
                    const std::vector<LensPrior>& priors,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/poses/pose_checks.h"
 
+#include <numbers>
+
 #include <gtest/gtest.h>
 
 #include "tests/support/scene_files.h"
@@ -76,6 +78,24 @@ TEST(RefuseUnsure, CountsOnlyWhatPlacedPhotographsHaveInCommon) {
   const std::string message = message_of([&] { check(solved(20, 80, 0)); });
   EXPECT_NE(message.find("20 of 100 points fit"), std::string::npos) << message;
   EXPECT_THROW(check(solved(11, 0, 0)), NumericalError);
+}
+
+TEST(RefuseUnsure, RefusesCamerasThatCouldNotShowTheSame) {
+  const auto check = [](double degrees, double focal, const std::vector<PhotoPair>& pairs) {
+    Reconstruction scene = solved(80, 20, 0);
+    scene.lenses[0].focal = focal;
+    const double angle = degrees * std::numbers::pi / 180;
+    scene.poses[1]->rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY());
+    scene.poses[2] = PhotoPose{};
+    refuse_unsure(photos({99, 99, 99, 99}), kAnyLens, pairs, scene, {0.01});
+  };
+  EXPECT_NO_THROW(check(59, 1000, kPairs));
+  EXPECT_THROW(check(63, 1100, kPairs), NumericalError);
+  EXPECT_NO_THROW(check(63, 800, kPairs));  // 74 degrees wide
+  const PhotoPair beside = pair_of(0, 2, 100, true);
+  EXPECT_THROW(check(63, 1100, {kPairs[0], beside}), NumericalError);
+  EXPECT_NO_THROW(check(63, 1100, {kPairs[0], beside, pair_of(2, 0, 100, true)}));
+  EXPECT_NO_THROW(check(63, 1100, {pair_of(0, 1, 9, false), beside}));
 }
 
 TEST(RefuseUnsure, AsksForAFocalLengthThatIsNotDetermined) {
