@@ -192,8 +192,8 @@ void add_estimated_option(CLI::App& command, std::optional<EstimatedSurface>& es
           "--estimated",
           estimated,
           "Surface that photographs show but nothing measured: keep, fill-only (where it is "
-          "small and framed by what was measured), drop; default fill-only. It is never "
-          "counted as evidence")
+          "small and framed by what was measured, or ground or a wall that goes on), drop; "
+          "default fill-only. It is never counted as evidence")
       ->transform(
           CLI::CheckedTransformer(estimated_surfaces()).description("keep, fill-only, drop"));
 }

@@ -92,14 +92,7 @@ std::vector<MaskMap> measured_on(const std::vector<MeasuredPlane>& planes,
   for (int y = 0; y < origin.height; ++y) {
     for (int x = 0; x < origin.width; ++x) {
       if (origin(x, y) != DepthOrigin::Measured) continue;
-      const double z = double{priors.depth(x, y)};
-      const Eigen::Vector3d point = camera.unproject(x + 0.5, y + 0.5, z);
-      const Eigen::Vector3d ray = (point - camera.center()).normalized();
-      const auto found =
-          std::find_if(planes.begin(), planes.end(), [&](const MeasuredPlane& plane) {
-            return lies_on(plane.plane, point, ray, z);
-          });
-      out[static_cast<size_t>(found - planes.begin())](x, y) = 1;
+      out[plane_of(planes, camera, x, y, double{priors.depth(x, y)})](x, y) = 1;
     }
   }
   return out;

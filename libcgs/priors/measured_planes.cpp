@@ -287,8 +287,14 @@ class PlaneSearch {
 
 }  // namespace
 
-bool lies_on(const Plane& plane, const Vector3d& point, const Vector3d& ray, double depth) {
-  return plane.absDistance(point) <= tolerance(plane, ray, depth);
+size_t plane_of(
+    const std::vector<MeasuredPlane>& planes, const Camera& camera, int x, int y, double depth) {
+  const Vector3d point = camera.unproject(x + 0.5, y + 0.5, depth);
+  const Vector3d ray = (point - camera.center()).normalized();
+  const auto found = std::find_if(planes.begin(), planes.end(), [&](const MeasuredPlane& plane) {
+    return plane.plane.absDistance(point) <= tolerance(plane.plane, ray, depth);
+  });
+  return static_cast<size_t>(found - planes.begin());
 }
 
 std::vector<MeasuredPlane> measured_planes(const Scene& scene,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -17,13 +18,11 @@ struct MeasuredPlane {
                       ///< units]; minus infinity for ground.
 };
 
-/// Whether a point at a z-depth lies on a plane: within 2 % of the depth along its ray, and half a
-/// percent across the plane.
-/// \param ray  unit vector from its camera
-bool lies_on(const Eigen::Hyperplane<double, 3>& plane,
-             const Eigen::Vector3d& point,
-             const Eigen::Vector3d& ray,
-             double depth);
+/// The first of some planes on which a pixel lies at a z-depth [internal units]: within 2 % of the
+/// depth along its ray, and half a percent across the plane.
+/// \return its index; planes.size() where it lies on none
+size_t plane_of(
+    const std::vector<MeasuredPlane>& planes, const Camera& camera, int x, int y, double depth);
 
 /// Level ground and upright walls that many measured pixels of all views lie on: one in 25 or more
 /// of them. Whatever is large has slices that look like planes, so that more is asked for: hardly

@@ -15,7 +15,8 @@ namespace cgs {
 /// Which estimated surface goes into a volume, and so into the meshes made of it.
 enum class EstimatedSurface {
   Keep,      ///< All.
-  FillOnly,  ///< Where it is small and framed by evidence: framed_estimates().
+  FillOnly,  ///< Where it is small and framed by evidence, see framed_estimates(), or lies on
+             ///< measured_planes().
   Drop       ///< None.
 };
 

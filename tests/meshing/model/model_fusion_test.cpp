@@ -91,6 +91,22 @@ TEST(FuseModel, TakesEstimatedSurfaceAsItIsTold) {
   }
 }
 
+TEST(FuseModel, FillsWallsThatGoOn) {
+  Model model = plane_below_sky();
+  model.scene.frame.up = -Vector3d::UnitY();
+  const auto fused = [&] {
+    return fuse_model(model, {.voxel_size = 0, .estimated = EstimatedSurface::FillOnly}, {}).volume;
+  };
+  EXPECT_EQ(state_at(fused(), kAtBorder), VoxelState::Estimated);
+  for (ViewPriors& priors : model.priors) {  // beside the wall
+    for (size_t i = 0; i < priors.depth.data.size(); ++i) {
+      if (priors.origin.data[i] == DepthOrigin::Estimated) priors.depth.data[i] *= 0.9f;
+    }
+  }
+  EXPECT_FALSE(has_surface(fused(), kAtBorder));
+  EXPECT_FALSE(has_surface(fused(), 0.9 * kAtBorder - Vector3d(0, 0, 0.1)));
+}
+
 TEST(FuseModel, CountsEstimatedVoxels) {
   std::map<EstimatedSurface, TsdfReport> reports;
   for (const EstimatedSurface estimated : kAllWays) {
