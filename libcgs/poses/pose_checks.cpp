@@ -63,12 +63,10 @@ double share_on_planes(const std::vector<PhotoPair>& pairs) {
   return all > 0 ? double(on_plane) / double(all) : 0;
 }
 
-// Whether the axes of two placed photographs are further apart than 60 degrees and than either
-// picture is wide. Nothing would look alike in both.
-bool look_apart(const Reconstruction& scene,
-                const std::vector<LensPrior>& priors,
-                const PhotoPair& pair) {
-  constexpr double kMost = std::numbers::pi / 3;
+// Whether the axes of two placed photographs are further apart than 90 degrees and than either
+// picture is wide: what faces one camera turns its back on the other.
+bool look_apart(const Reconstruction& scene, const std::vector<LensPrior>& priors, int a, int b) {
+  constexpr double kMost = std::numbers::pi / 2;
   const auto axis = [&](int photo) {
     return scene.pose(photo)->rotation.conjugate() * Eigen::Vector3d::UnitZ();
   };
@@ -76,22 +74,29 @@ bool look_apart(const Reconstruction& scene,
     const LensPrior& prior = priors[static_cast<size_t>(scene.lens_of[static_cast<size_t>(photo)])];
     return 2 * std::atan(prior.side / 2 / scene.lens(photo).focal);
   };
-  return angle_between(axis(pair.a), axis(pair.b)) >
-         std::max({kMost, width(pair.a), width(pair.b)});
+  return angle_between(axis(a), axis(b)) > std::max({kMost, width(a), width(b)});
 }
 
-// Whether half or more of the photographs that share something would look apart.
-bool is_turned_away(const Reconstruction& scene,
-                    const std::vector<LensPrior>& priors,
-                    const std::vector<PhotoPair>& pairs) {
-  size_t apart = 0;
-  size_t all = 0;
-  for (const PhotoPair& pair : pairs) {
-    if (!pair.is_connected || !scene.pose(pair.a) || !scene.pose(pair.b)) continue;
-    ++all;
-    apart += look_apart(scene, priors, pair) ? 1 : 0;
+// Placed photographs that look apart from all with which they share points of the solution.
+std::vector<int> turned_away(const Reconstruction& scene, const std::vector<LensPrior>& priors) {
+  enum : char { Alone, Apart, Beside };
+  std::vector<char> placed(scene.poses.size(), Alone);
+  for (const Track& track : scene.tracks) {
+    if (!track.is_known) continue;
+    for (const Observation& a : track.seen) {
+      for (const Observation& b : track.seen) {
+        if (a.photo == b.photo || !a.is_used || !b.is_used) continue;
+        if (!scene.pose(a.photo) || !scene.pose(b.photo)) continue;
+        char& found = placed[static_cast<size_t>(a.photo)];
+        if (found != Beside) found = look_apart(scene, priors, a.photo, b.photo) ? Apart : Beside;
+      }
+    }
   }
-  return apart > 0 && 2 * apart >= all;
+  std::vector<int> out;
+  for (size_t i = 0; i < placed.size(); ++i) {
+    if (placed[i] == Apart) out.push_back(static_cast<int>(i));
+  }
+  return out;
 }
 
 }  // namespace
@@ -161,10 +166,6 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
     throw NumericalError(unexplained_matches(photos, pairs) + " (" + std::to_string(known) +
                          " of " + std::to_string(all) + " points fit)");
   }
-  if (is_turned_away(scene, priors, pairs)) {
-    throw NumericalError(unexplained_matches(photos, pairs) +
-                         " (those that fit best look in quite different directions)");
-  }
   constexpr double kMostSigma = 0.1;
   constexpr double kShortest = 0.32;  // [larger sides] phones' widest lenses have 0.36,
   constexpr double kLongest = 8;      // telephoto lenses of 300 mm 8.3
@@ -182,6 +183,13 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
         std::isfinite(focal_sigmas[lens])
             ? "uncertain by " + decimals(100 * kOptimism * focal_sigmas[lens], 0) + " %"
             : "");
+  }
+  const std::vector<int> away = turned_away(scene, priors);
+  const auto placed = std::count_if(
+      scene.poses.begin(), scene.poses.end(), [](const auto& pose) { return pose.has_value(); });
+  if (!away.empty() && 3 * away.size() >= static_cast<size_t>(placed)) {
+    throw NumericalError(unexplained_matches(photos, pairs) + " (" + name_of(photos, away.front()) +
+                         " would look in quite another direction than the others)");
   }
 }
 

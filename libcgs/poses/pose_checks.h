@@ -24,8 +24,8 @@ void refuse_turned_only(const std::vector<UnposedPhoto>& photos,
                         const std::vector<PhotoPair>& pairs);
 
 /// \throws NumericalError if a focal length of which nothing was known is not determined, most
-///         matches disagree with the solution, or half of the photographs that share something look
-///         in directions so far apart that they could not.
+///         matches disagree with the solution, or a third of the placed photographs look so far
+///         aside of all with which they share points that these could not look alike.
 /// \param focal_sigmas  per lens, as from adjust_bundle()
 void refuse_unsure(const std::vector<UnposedPhoto>& photos,
                    const std::vector<LensPrior>& priors,

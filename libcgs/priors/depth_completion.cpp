@@ -231,6 +231,12 @@ void DepthCompletionOptions::validate() const {
           smoothing_rounds);
 }
 
+float filled_sigma(float spread, float way, float sigma_per_pixel) {
+  constexpr float kFloor = 0.02f;  // next to the evidence
+  constexpr float kCap = 0.5f;
+  return std::min(kFloor + spread + sigma_per_pixel * way, kCap);
+}
+
 void complete_depth(ViewPriors& priors,
                     const View& view,
                     const DepthCompletionOptions& options,
@@ -241,17 +247,15 @@ void complete_depth(ViewPriors& priors,
   completion.collect(fallback_inverse_depth(priors, options), part_of(progress, 0, 0.5));
   completion.smooth(part_of(progress, 0.5, 1));
   completion.clear_sights();
-  constexpr float kFloor = 0.02f;  // relative sigma next to the evidence
-  constexpr float kCap = 0.5f;
   for (int y = 0; y < priors.depth.height; ++y) {
     for (int x = 0; x < priors.depth.width; ++x) {
       if (!completion.usable(x, y) || completion.measured(x, y)) continue;
       const Filled& filled = completion.filled()(x, y);
       if (std::isnan(filled.inverse_depth)) continue;
-      const float relative =
-          kFloor + filled.spread / filled.inverse_depth + options.sigma_per_pixel * filled.distance;
+      const float relative = filled_sigma(
+          filled.spread / filled.inverse_depth, filled.distance, options.sigma_per_pixel);
       priors.depth(x, y) = 1 / filled.inverse_depth;
-      priors.sigma(x, y) = std::min(relative, kCap) / filled.inverse_depth;
+      priors.sigma(x, y) = relative / filled.inverse_depth;
       priors.origin(x, y) = DepthOrigin::Completed;
     }
   }

@@ -24,6 +24,12 @@ struct DepthCompletionOptions {
   void validate() const;
 };
 
+/// Standard deviation of filled-in depth, relative to it.
+/// \param spread  of the evidence around, relative
+/// \param way  to the nearest evidence [pixels]
+/// \param sigma_per_pixel  as in DepthCompletionOptions
+float filled_sigma(float spread, float way, float sigma_per_pixel);
+
 /// Gives every valid pixel a finite depth, but not sky, nor what would stand in the way of a
 /// witness at any depth. Measured pixels are left as they are; the others get origin Completed, a
 /// large sigma and keep their confidence.

@@ -10,14 +10,14 @@ namespace cgs {
 
 /// Another view as a witness of empty space: nothing stands before what it measured.
 struct CompletionWitness {
-  const Camera* camera = nullptr;      ///< Not owned; must outlive the call.
-  const ViewPriors* priors = nullptr;  ///< Likewise. Only measured pixels and sky speak.
+  const Camera* camera = nullptr;      ///< Not owned.
+  const ViewPriors* priors = nullptr;  ///< Not owned. Only measured pixels and sky speak.
 };
 
 /// Whether a witness sees past points of a view.
 class EmptySpace {
  public:
-  /// \pre camera and witness outlive this
+  /// \pre the camera, and the priors of the witness, outlive this
   EmptySpace(const Camera& camera, const CompletionWitness& witness);
 
   /// Whether the witness sees past the point of pixel (x, y) at an inverse depth > 0: by more than

@@ -72,6 +72,7 @@ class Estimator {
 
   EstimatedPriors run(const Progress& progress) {
     constexpr double kSweepShare = 0.95;  // of the time
+    constexpr double kCompletedShare = 0.98;
     out_.views = plane_sweep(scene_, options_.sweep, part_of(progress, 0, kSweepShare));
     out_.report.alignment = align_depths(scene_, out_.views, options_.alignment);
     const GivenDepth given = fit_given_depth(scene_, out_.views);
@@ -90,12 +91,12 @@ class Estimator {
     const std::vector<DepthGuess> guesses = guesses_of(given);
     const auto count = static_cast<double>(out_.views.size());
     for (size_t i = 0; i < out_.views.size(); ++i) {
-      const Progress completing = part_of(progress, kSweepShare, 1);
+      const Progress completing = part_of(progress, kSweepShare, kCompletedShare);
       complete(i, out_.views[i], part_of(completing, double(i) / count, double(i + 1) / count));
       enter_guess(guesses[i], out_.views[i]);
     }
     set_backdrop(out_.views);
-    tell_evidence();
+    tell_evidence(part_of(progress, kCompletedShare, 1));
     const std::vector<UnmeasuredShares> why = unmeasured_shares(scene_, out_.views);
     for (size_t i = 0; i < why.size(); ++i) out_.report.coverage[i].unmeasured = why[i];
     forget_unmeasured();
@@ -106,14 +107,24 @@ class Estimator {
  private:
   // Only when all views are completed: those before another are its witnesses as they were
   // measured.
-  void tell_evidence() {
+  void tell_evidence(const Progress& progress) {
     std::vector<Raster<DepthOrigin>> filled;
     for (size_t i = 0; i < out_.views.size(); ++i) {
       limit_completion(out_.views[i]);
       filled.push_back(out_.views[i].origin);
       mark_estimated(out_.views[i], view(i), options_.adjoining);
     }
-    continue_planes(scene_, measured_planes(scene_, out_.views), out_.views);
+    // A network knows more of what is seen than that there may be a wall.
+    const bool is_guessed = std::any_of(filled.begin(), filled.end(), [](const auto& origin) {
+      return std::count(origin.data.begin(), origin.data.end(), DepthOrigin::Guessed) > 0;
+    });
+    if (!is_guessed) {
+      continue_planes(scene_,
+                      measured_planes(scene_, out_.views),
+                      options_.completion.sigma_per_pixel,
+                      out_.views,
+                      progress);
+    }
     for (size_t i = 0; i < out_.views.size(); ++i) {
       ViewPriors& priors = out_.views[i];
       for (size_t k = 0; k < filled[i].data.size(); ++k) {

@@ -72,9 +72,9 @@ struct EstimatedPriors {
 
 /// Everything known about the input views before training: sweep, align, enter the depth of
 /// sensors, find the sky, what moved and what is around an object that stands alone, complete, put
-/// guesses of given depth where they are better, tell what of all that is estimated, layers. The
-/// depth of views of which nothing was measured stays unknown. Preconditions and errors as
-/// plane_sweep().
+/// guesses of given depth where they are better, tell what of all that is estimated, continue
+/// ground and walls where nothing was guessed, layers. The depth of views of which nothing was
+/// measured stays unknown. Preconditions and errors as plane_sweep().
 /// \throws InvalidInput if masks leave nothing of all views; NumericalError if nothing of any was
 ///         measured
 EstimatedPriors estimate_priors(const Scene& scene,

@@ -67,15 +67,23 @@ Vector3d normal_around(const Camera& camera, const ViewPriors& priors, int x0, i
   return axes.eigenvectors().col(0);
 }
 
-// Measured pixels on a grid as dense as about so many of all views allow.
-std::vector<Sample> samples_of(const Scene& scene, const std::vector<ViewPriors>& priors) {
+// Distance of samples, so that there are about as many as are needed to tell planes [pixels].
+int sample_step(const std::vector<ViewPriors>& priors) {
   constexpr double kWanted = 8'000;
+  constexpr double kPerView = 150;
   double measured = 0;
   for (const ViewPriors& p : priors) {
     measured +=
         double(std::count(p.origin.data.begin(), p.origin.data.end(), DepthOrigin::Measured));
   }
-  const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(measured / kWanted))));
+  const double wanted = std::max(kWanted, kPerView * double(priors.size()));
+  return std::max(1, static_cast<int>(std::ceil(std::sqrt(measured / wanted))));
+}
+
+// Measured pixels on a grid, view by view.
+std::vector<Sample> samples_of(const Scene& scene,
+                               const std::vector<ViewPriors>& priors,
+                               int step) {
   std::vector<Sample> out;
   for (size_t v = 0; v < priors.size(); ++v) {
     const Camera& camera = scene.views[static_cast<size_t>(scene.input[v])].camera;
@@ -172,15 +180,23 @@ class PlaneSearch {
 
   std::optional<Plane> upright_plane(uint64_t number, uint64_t trial) const {
     const Sample& a = drawn(number, trial, 0);
+    const auto [first, last] = of_view(a.view);
     for (uint64_t k = 1; k < kDraws; ++k) {
-      const Sample& b = drawn(number, trial, k);
-      if (b.view != a.view || std::abs(b.x - a.x) > reach_ || std::abs(b.y - a.y) > reach_) {
-        continue;
-      }
+      const uint64_t drawn = random_number((number << 32U) + kDraws * trial + k);
+      const Sample& b = samples_[left_[first + drawn % (last - first)]];
+      if (std::abs(b.x - a.x) > reach_ || std::abs(b.y - a.y) > reach_) continue;
       const Vector3d normal = (b.at - a.at).cross(up_);
       if (normal.norm() > 0) return Plane(normal.normalized(), a.at);
     }
     return std::nullopt;
+  }
+
+  // Where the samples of a view are among those that are left; there is one.
+  std::pair<size_t, size_t> of_view(size_t view) const {
+    const auto is_before = [&](size_t i, size_t v) { return samples_[i].view < v; };
+    const auto first = std::lower_bound(left_.begin(), left_.end(), view, is_before);
+    const auto last = std::lower_bound(first, left_.end(), view + 1, is_before);
+    return {first - left_.begin(), last - left_.begin()};
   }
 
   std::optional<Plane> best_of_trials(uint64_t number) const {
@@ -246,7 +262,7 @@ class PlaneSearch {
 
   // Whether in half of the views it goes from near to far.
   bool is_long(const Indices& on) const {
-    constexpr size_t kFewest = 20;
+    constexpr size_t kFewest = 10;
     constexpr double kLong = 4;
     std::vector<std::vector<double>> depths;
     for (const size_t i : on) {
@@ -282,7 +298,7 @@ class PlaneSearch {
   std::vector<Sample> samples_;
   Vector3d up_;
   int reach_;     // of the second sample of a wall from the first [pixels]
-  Indices left_;  // on no plane yet
+  Indices left_;  // on no plane yet, ascending
 };
 
 }  // namespace
@@ -304,7 +320,9 @@ std::vector<MeasuredPlane> measured_planes(const Scene& scene,
   if (!scene.frame.knows_up()) return out;
   int longest = 0;
   for (const ViewPriors& p : priors) longest = std::max({longest, p.depth.width, p.depth.height});
-  PlaneSearch search(samples_of(scene, priors), scene.frame.up, std::max(1, longest / 10));
+  const int step = sample_step(priors);
+  const int reach = std::max(longest / 10, 3 * step);
+  PlaneSearch search(samples_of(scene, priors, step), scene.frame.up, reach);
   for (uint64_t k = 0; k < kMost; ++k) {
     const auto next = search.take_next(k);
     if (!next) break;

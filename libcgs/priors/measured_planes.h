@@ -30,7 +30,7 @@ size_t plane_of(
 /// wide range of depths. What has more below it than one pixel in 20 is no ground.
 ///
 /// \param priors  of scene.input, in its order
-/// \return the largest first, the same for the same input; empty where Frame::up is not known
+/// \return about by size, the same for the same input; empty where Frame::up is not known
 /// Source: Fischler and Bolles 1981, "Random sample consensus"; Furukawa et al. 2009,
 ///         "Manhattan-world stereo".
 std::vector<MeasuredPlane> measured_planes(const Scene& scene,

@@ -20,7 +20,8 @@ enum class DepthOrigin : uint8_t {
                    ///< fitted to the measured pixels.
   Sky = 4,         ///< No surface; depth is that of a backdrop for pictures.
   Estimated = 5,   ///< Completed or Guessed, but not a small way from a measured pixel of the same
-                   ///< surface (mark_estimated()): nothing tells whether it is right.
+                   ///< surface (mark_estimated()), or on a plane that goes on (continue_planes()):
+                   ///< nothing tells whether it is right.
   Transient = 6,   ///< No depth: something that the other photographs do not show in its place.
   Background = 7,  ///< No depth: around an object that stands alone (see mark_background()).
 };

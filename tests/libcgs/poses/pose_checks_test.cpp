@@ -81,21 +81,27 @@ TEST(RefuseUnsure, CountsOnlyWhatPlacedPhotographsHaveInCommon) {
 }
 
 TEST(RefuseUnsure, RefusesCamerasThatCouldNotShowTheSame) {
-  const auto check = [](double degrees, double focal, const std::vector<PhotoPair>& pairs) {
+  const auto check = [](double degrees, double focal, int beside) {
     Reconstruction scene = solved(80, 20, 0);
     scene.lenses[0].focal = focal;
     const double angle = degrees * std::numbers::pi / 180;
-    scene.poses[1]->rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY());
-    scene.poses[2] = PhotoPose{};
-    refuse_unsure(photos({99, 99, 99, 99}), kAnyLens, pairs, scene, {0.01});
+    scene.poses[0]->rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY());
+    for (int k = 0; k < beside; ++k) {  // look as photograph 1 does, and share a point with it
+      scene.poses[static_cast<size_t>(2 + k)] = PhotoPose{};
+      Track track;
+      track.seen = {{1, 0, {0, 0}, true}, {2 + k, 0, {0, 0}, true}};
+      track.is_known = true;
+      scene.tracks.push_back(track);
+    }
+    refuse_unsure(photos({99, 99, 99, 99}), kAnyLens, kPairs, scene, {0.01});
   };
-  EXPECT_NO_THROW(check(59, 1000, kPairs));
-  EXPECT_THROW(check(63, 1100, kPairs), NumericalError);
-  EXPECT_NO_THROW(check(63, 800, kPairs));  // 74 degrees wide
-  const PhotoPair beside = pair_of(0, 2, 100, true);
-  EXPECT_THROW(check(63, 1100, {kPairs[0], beside}), NumericalError);
-  EXPECT_NO_THROW(check(63, 1100, {kPairs[0], beside, pair_of(2, 0, 100, true)}));
-  EXPECT_NO_THROW(check(63, 1100, {pair_of(0, 1, 9, false), beside}));
+  EXPECT_NO_THROW(check(71, 1100, 0));
+  EXPECT_THROW(check(95, 1100, 0), NumericalError);
+  EXPECT_NO_THROW(check(95, 500, 0));  // 100 degrees wide
+  const std::string message = message_of([&] { check(95, 1100, 1); });
+  EXPECT_NE(message.find("photo_0 would look in quite another direction"), std::string::npos)
+      << message;
+  EXPECT_NO_THROW(check(95, 1100, 2));  // one of four
 }
 
 TEST(RefuseUnsure, AsksForAFocalLengthThatIsNotDetermined) {

@@ -13,8 +13,11 @@ namespace {
 using Eigen::Vector3d;
 using test::MeasuredPatches;
 
-void continue_all(MeasuredPatches& scene) {
-  continue_planes(scene.scene, measured_planes(scene.scene, scene.priors), scene.priors);
+// \return how many planes were found
+size_t continue_all(MeasuredPatches& scene) {
+  const auto planes = measured_planes(scene.scene, scene.priors);
+  continue_planes(scene.scene, planes, 0.002f, scene.priors);
+  return planes.size();
 }
 
 struct Result {
@@ -105,7 +108,7 @@ TEST(ContinuePlanes, LeavesThingsBeforeThemAlone) {
   }
 }
 
-// Where a wall ends, the cameras see past it.
+// Where a wall ends, something behind it was measured.
 TEST(ContinuePlanes, EndsWhereSomethingBehindWasMeasured) {
   auto patches = test::street();
   patches[1].point.z() = 20;  // the left wall begins at 14
@@ -113,25 +116,63 @@ TEST(ContinuePlanes, EndsWhereSomethingBehindWasMeasured) {
   patches.push_back({Vector3d(-12, -1, 20), Vector3d::UnitY(), Vector3d::UnitZ(), 2.5, 20});
   MeasuredPatches street(patches);
   street.keep([&](int x, int, float z) { return z > 6 && z < 25 && !(x > 10 && x < 16); });
-  continue_all(street);
+  EXPECT_GE(continue_all(street), 2);
   const ViewPriors& priors = street.priors[0];
   for (int x = 11; x < 16; ++x) {
     const bool is_wall = priors.origin(x, 45) == DepthOrigin::Estimated &&
-                         std::abs(priors.depth(x, 45) * (60 - x) / 80 - 2) < 0.1;
+                         std::abs(priors.depth(x, 45) * float(60 - x) / 80 - 2) < 0.1f;
     EXPECT_FALSE(is_wall) << x;
   }
 }
 
-// A wall of which nothing is known below the height of the eye ends there.
+// A wall with a gap that the other view looks through.
+TEST(ContinuePlanes, EndsWhereAnotherViewSeesPast) {
+  const std::vector<test::TexturedPatch> wall = {
+      {Vector3d(0, 0, 8), Vector3d::UnitX(), Vector3d::UnitY(), 20, 20}};
+  const auto in_gap = [](int x, int) { return x >= 50 && x < 70; };
+  for (const DepthOrigin origin : {DepthOrigin::Measured, DepthOrigin::Sky, DepthOrigin::Unknown}) {
+    MeasuredPatches scene(wall);
+    scene.keep([&](int x, int y, float) { return !in_gap(x, y); });
+    ViewPriors& other = scene.priors[1];
+    for (int x = 45; x < 75 && origin != DepthOrigin::Unknown; ++x) {
+      for (int y = 0; y < MeasuredPatches::kHeight; ++y) {
+        other.origin(x, y) = origin;
+        other.depth(x, y) = 20;
+        other.sigma(x, y) = 0.01f;
+      }
+    }
+    EXPECT_EQ(continue_all(scene), 1);
+    const bool is_filled = scene.priors[0].origin(60, 45) == DepthOrigin::Estimated;
+    EXPECT_EQ(is_filled, origin == DepthOrigin::Unknown);
+  }
+}
+
+// A wall of which nothing is known below some height ends there.
 TEST(ContinuePlanes, EndsWallsBelowWhatWasMeasuredOfThem) {
-  MeasuredPatches facade({{Vector3d(0, 0, 8), Vector3d::UnitX(), Vector3d::UnitY(), 20, 20}});
-  facade.keep([](int, int y, float) { return y < 50; });
-  continue_all(facade);
-  EXPECT_EQ(facade.priors[0].origin(60, 80), DepthOrigin::Unknown);
-  MeasuredPatches gap({{Vector3d(0, 0, 8), Vector3d::UnitX(), Vector3d::UnitY(), 20, 20}});
-  gap.keep([](int x, int, float) { return x < 50 || x >= 70; });
-  continue_all(gap);
-  EXPECT_NEAR(gap.priors[0].depth(60, 45), 8, 0.1);
+  MeasuredPatches wall({{Vector3d(0, 0, 8), Vector3d::UnitX(), Vector3d::UnitY(), 20, 20}});
+  wall.keep([](int x, int y, float) { return y < 50 && (x < 50 || x >= 70); });
+  EXPECT_EQ(continue_all(wall), 1);
+  EXPECT_EQ(wall.priors[0].origin(60, 80), DepthOrigin::Unknown);
+  EXPECT_NEAR(wall.priors[0].depth(60, 45), 8, 0.1);
+}
+
+TEST(ContinuePlanes, LeavesGroundThatIsSeenFromBelow) {
+  MeasuredPatches street(test::street());
+  const auto planes = measured_planes(street.scene, street.priors);
+  street.keep([](int, int, float z) { return z > 6 && z < 25; });
+  for (View& view : street.scene.views) view.camera.world_from_cam.translation().y() += 3;
+  continue_planes(street.scene, planes, 0.002f, street.priors);
+  for (int x = 50; x < 70; ++x) EXPECT_EQ(street.priors[0].origin(x, 85), DepthOrigin::Unknown);
+}
+
+TEST(ContinuePlanes, LeavesViewsOfWhichNothingWasMeasured) {
+  MeasuredPatches street(test::street());
+  street.keep([](int, int, float z) { return z > 6 && z < 25; });
+  street.priors[1] = test::unmeasured_priors(MeasuredPatches::kWidth, MeasuredPatches::kHeight);
+  EXPECT_EQ(continue_all(street), 3);
+  for (const DepthOrigin origin : street.priors[1].origin.data) {
+    ASSERT_EQ(origin, DepthOrigin::Unknown);
+  }
 }
 
 }  // namespace

@@ -45,6 +45,21 @@ TEST(MeasuredPlanes, AreFoundFarAway) {
   EXPECT_TRUE(has_plane(planes, Vector3d::UnitY(), {0, 1.5, 5}));
 }
 
+TEST(MeasuredPlanes, AreFoundInManyViews) {
+  MeasuredPatches street(test::street());
+  street.keep([](int, int, float z) { return z > 3 && z < 25; });
+  Scene many = street.scene;
+  many.views.clear();
+  many.input.clear();
+  std::vector<ViewPriors> priors;
+  for (int i = 0; i < 100; ++i) {
+    many.input.push_back(i);
+    many.views.push_back(street.scene.views[static_cast<size_t>(i % 2)]);
+    priors.push_back(street.priors[static_cast<size_t>(i % 2)]);
+  }
+  EXPECT_EQ(measured_planes(many, priors).size(), 3);
+}
+
 TEST(MeasuredPlanes, AreNoneWhereUpIsNotKnown) {
   MeasuredPatches street(test::street());
   street.scene.frame.up.setZero();
