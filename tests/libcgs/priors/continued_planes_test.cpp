@@ -141,7 +141,7 @@ TEST(ContinuePlanes, EndsWhereAnotherViewSeesPast) {
         other.sigma(x, y) = 0.01f;
       }
     }
-    EXPECT_EQ(continue_all(scene), 1);
+    EXPECT_GE(continue_all(scene), 1);
     const bool is_filled = scene.priors[0].origin(60, 45) == DepthOrigin::Estimated;
     EXPECT_EQ(is_filled, origin == DepthOrigin::Unknown);
   }
