@@ -54,30 +54,12 @@ DepthMap nearest_depth(const DepthMap& depth, const MaskMap& set, const cv::Mat1
   return out;
 }
 
-MaskMap without_small_patches(MaskMap mask, int fewest) {
-  cv::Mat labels;
-  cv::Mat stats;
-  cv::Mat centroids;
-  cv::connectedComponentsWithStats(mask_matrix(mask), labels, stats, centroids);
-  for (int y = 0; y < mask.height; ++y) {
-    for (int x = 0; x < mask.width; ++x) {
-      const int area = stats.at<int>(labels.at<int>(y, x), cv::CC_STAT_AREA);
-      if (area < fewest) mask(x, y) = 0;
-    }
-  }
-  return mask;
-}
-
 // Whether a camera looks onto a plane: not along it, nor at ground from below.
-bool looks_onto(const MeasuredPlane& plane,
-                const Camera& camera,
-                const Eigen::Vector3d& up,
-                double farthest) {
+bool looks_onto(const MeasuredPlane& plane, const Camera& camera, double farthest) {
   constexpr double kAlong = 0.005;  // of the depth, as planes are told
   const double side = plane.plane.signedDistance(camera.center());
   const bool is_ground = std::isinf(plane.lowest);
-  const double away = is_ground && plane.plane.normal().dot(up) < 0 ? -side : side;
-  return (is_ground ? away : std::abs(away)) > kAlong * farthest;
+  return (is_ground ? side : std::abs(side)) > kAlong * farthest;
 }
 
 // Depth of a plane at every pixel of a view; NaN where it can not be: beyond everything measured,
@@ -87,7 +69,7 @@ DepthMap depths_on(const MeasuredPlane& plane,
                    const Eigen::Vector3d& up,
                    double farthest) {
   DepthMap out(camera.width, camera.height, kNaN);
-  if (!looks_onto(plane, camera, up, farthest)) return out;
+  if (!looks_onto(plane, camera, farthest)) return out;
   tbb::parallel_for(0, out.height, [&](int y) {
     for (int x = 0; x < out.width; ++x) {
       const double z = depth_on(plane.plane, camera, x + 0.5, y + 0.5);
@@ -149,8 +131,7 @@ class Continuation {
       : witnesses_(std::move(witnesses)), planes_(planes.size()) {
     constexpr double kSmall = 0.002;  // of the picture
     std::vector<MaskMap> on = measured_on(planes, view.camera, priors);
-    const auto fewest = static_cast<int>(kSmall * double(priors.depth.data.size()));
-    on.back() = without_small_patches(std::move(on.back()), fewest);
+    remove_specks(on.back(), std::floor(kSmall * double(priors.depth.data.size())));
     MaskMap any = on.back();
     for (const MaskMap& of_plane : on) {
       for (size_t i = 0; i < any.data.size(); ++i) any.data[i] |= of_plane.data[i];

@@ -25,4 +25,18 @@ inline MaskMap dilated(MaskMap mask, int reach) {
   return mask;
 }
 
+/// Clears connected pixels that are fewer.
+inline void remove_specks(MaskMap& mask, double fewest) {
+  cv::Mat labels;
+  cv::Mat stats;
+  cv::Mat centroids;
+  cv::connectedComponentsWithStats(mask_matrix(mask), labels, stats, centroids);
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      const int area = stats.at<int>(labels.at<int>(y, x), cv::CC_STAT_AREA);
+      if (area < fewest) mask(x, y) = 0;
+    }
+  }
+}
+
 }  // namespace cgs

@@ -42,29 +42,44 @@ double distance(const Plane& plane, const Sample& s) {
   return plane.absDistance(s.at) / tolerance(plane, s.ray, s.depth);
 }
 
-// Across the least spread of the measured points around a pixel.
+// Weighted points, as differences from a place among them.
+class Spread {
+ public:
+  void add(const Vector3d& d, double weight = 1) {
+    sum_ += weight * d;
+    squares_ += weight * d * d.transpose();
+    weight_ += weight;
+  }
+  double weight() const { return weight_; }
+  Vector3d mean() const { return sum_ / weight_; }
+  // Across their plane of least squares.
+  Vector3d normal() const {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares_ -
+                                                              sum_ * sum_.transpose() / weight_);
+    return axes.eigenvectors().col(0);
+  }
+
+ private:
+  Vector3d sum_ = Vector3d::Zero();
+  Eigen::Matrix3d squares_ = Eigen::Matrix3d::Zero();
+  double weight_ = 0;
+};
+
+// Of the measured surface around a pixel; zero where too little is.
 Vector3d normal_around(const Camera& camera, const ViewPriors& priors, int x0, int y0) {
   constexpr int kReach = 4;
   constexpr int kFewest = 10;
-  Vector3d sum = Vector3d::Zero();
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  int count = 0;
+  Spread around;
   const double z0 = double{priors.depth(x0, y0)};
   const Vector3d centre = camera.unproject(x0 + 0.5, y0 + 0.5, z0);
   for (int y = std::max(0, y0 - kReach); y <= std::min(priors.depth.height - 1, y0 + kReach); ++y) {
     for (int x = std::max(0, x0 - kReach); x <= std::min(priors.depth.width - 1, x0 + kReach);
          ++x) {
       if (priors.origin(x, y) != DepthOrigin::Measured) continue;
-      const Vector3d d = camera.unproject(x + 0.5, y + 0.5, double{priors.depth(x, y)}) - centre;
-      sum += d;
-      squares += d * d.transpose();
-      ++count;
+      around.add(camera.unproject(x + 0.5, y + 0.5, double{priors.depth(x, y)}) - centre);
     }
   }
-  if (count < kFewest) return Vector3d::Zero();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares -
-                                                            sum * sum.transpose() / count);
-  return axes.eigenvectors().col(0);
+  return around.weight() < kFewest ? Vector3d(Vector3d::Zero()) : around.normal();
 }
 
 // Distance of samples, so that there are about as many as are needed to tell planes [pixels].
@@ -138,9 +153,11 @@ class PlaneSearch {
     const double beside = this->beside(plane);
     const double alike = double(count_alike(plane, on)) / double(on.size());
     if (std::abs(plane.normal().dot(up_)) > kLevel) {
-      const bool is_ground = (beside < kHardly || alike > kOfGround) && !has_more_below(plane);
+      Plane upwards = plane;
+      if (plane.normal().dot(up_) < 0) upwards.coeffs() = -plane.coeffs();
+      const bool is_ground = (beside < kHardly || alike > kOfGround) && !has_more_below(upwards);
       if (!is_ground) return std::nullopt;
-      return MeasuredPlane{plane, -std::numeric_limits<double>::infinity()};
+      return MeasuredPlane{upwards, -std::numeric_limits<double>::infinity()};
     }
     if (std::abs(plane.normal().dot(up_)) > kUpright) return std::nullopt;
     const bool is_wall = beside < kHardly || (beside < kLittle && alike > kOfWall) || is_long(on);
@@ -223,21 +240,13 @@ class PlaneSearch {
 
   // Least squares through what is left of the samples on it, relative to their depths.
   Plane fitted(const Plane& plane) const {
-    Vector3d sum = Vector3d::Zero();
-    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-    double weight = 0;
+    Spread spread;
     const Vector3d& centre = samples_.front().at;
     for (const size_t i : left_on(plane)) {
-      const Vector3d d = samples_[i].at - centre;
-      const double w = 1 / samples_[i].depth;
-      sum += w * d;
-      squares += w * d * d.transpose();
-      weight += w;
+      spread.add(samples_[i].at - centre, 1 / samples_[i].depth);
     }
-    if (!(weight > 0)) return plane;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares -
-                                                              sum * sum.transpose() / weight);
-    return {axes.eigenvectors().col(0), Vector3d(centre + sum / weight)};
+    if (!(spread.weight() > 0)) return plane;
+    return {spread.normal(), Vector3d(centre + spread.mean())};
   }
 
   // How much lies just beside it, of what lies on it.
@@ -285,12 +294,12 @@ class PlaneSearch {
     return quantile(heights, kOutliers);
   }
 
+  // \pre the normal points up
   bool has_more_below(const Plane& plane) const {
     constexpr double kMost = 0.05;
     constexpr double kBelow = 0.02;  // of the depth
-    const double upwards = plane.normal().dot(up_) > 0 ? 1 : -1;
     const auto below = std::count_if(samples_.begin(), samples_.end(), [&](const Sample& s) {
-      return upwards * plane.signedDistance(s.at) < -kBelow * s.depth;
+      return plane.signedDistance(s.at) < -kBelow * s.depth;
     });
     return double(below) > kMost * double(samples_.size());
   }

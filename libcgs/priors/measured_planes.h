@@ -13,7 +13,7 @@ namespace cgs {
 
 /// Ground or a wall that was measured.
 struct MeasuredPlane {
-  Eigen::Hyperplane<double, 3> plane;  ///< [internal units]
+  Eigen::Hyperplane<double, 3> plane;  ///< [internal units]; the normal of ground points up.
   double lowest = 0;  ///< Of what was measured of a wall, the height along Frame::up [internal
                       ///< units]; minus infinity for ground.
 };

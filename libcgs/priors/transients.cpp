@@ -94,20 +94,6 @@ MaskMap majority(MaskMap found, MaskMap known) {
   return out;
 }
 
-void remove_specks(MaskMap& mask) {
-  constexpr double kSmallest = 1e-3;  // of the picture
-  cv::Mat labels;
-  cv::Mat stats;
-  cv::Mat centroids;
-  cv::connectedComponentsWithStats(mask_matrix(mask), labels, stats, centroids);
-  for (int y = 0; y < mask.height; ++y) {
-    for (int x = 0; x < mask.width; ++x) {
-      const int area = stats.at<int>(labels.at<int>(y, x), cv::CC_STAT_AREA);
-      if (area < kSmallest * double(mask.data.size())) mask(x, y) = 0;
-    }
-  }
-}
-
 cv::Mat disc(int radius) {
   return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1});
 }
@@ -116,11 +102,13 @@ cv::Mat disc(int radius) {
 // a little wider: colours mix at rims.
 // \param unclear  where others agree on a surface that this view did not measure
 MaskMap cleaned(const MaskMap& found, const MaskMap& known, MaskMap unclear) try {
+  constexpr double kSmallest = 1e-3;  // of the picture
   constexpr int kGap = 6;
   constexpr int kReach = 12;
   constexpr int kRim = 2;
   MaskMap out = majority(found, known);
-  remove_specks(out);
+  const double fewest = kSmallest * double(out.data.size());
+  remove_specks(out, fewest);
   cv::morphologyEx(mask_matrix(out), mask_matrix(out), cv::MORPH_CLOSE, disc(kGap));
   for (int k = 0; k < kReach; ++k) {
     cv::Mat grown;
@@ -129,7 +117,7 @@ MaskMap cleaned(const MaskMap& found, const MaskMap& known, MaskMap unclear) try
   }
   cv::dilate(mask_matrix(out), mask_matrix(out), disc(kRim));
   MaskMap rest = inverted(out);
-  remove_specks(rest);
+  remove_specks(rest, fewest);
   return inverted(rest);
 } catch (const cv::Exception& error) {
   throw_if_out_of_memory(error);
