@@ -59,15 +59,17 @@ void add_output_options(CLI::App& command, CommonOptions& options) {
   command.add_flag("--strict", options.strict, "A warning ends the command with exit code 3");
 }
 
-void add_fill_option(CLI::App& command, HoleFill& fill) {
-  static const std::map<std::string, HoleFill> kNames = {{"around", HoleFill::Around},
-                                                         {"none", HoleFill::None}};
+void add_fill_option(CLI::App& command, HoleFill& fill, const char* shown) {
   command
       .add_option("--fill",
                   fill,
-                  "What pictures show where nothing was reconstructed: the colours around it "
-                  "(default; not around what masks cut out), or none: black")
-      ->transform(CLI::CheckedTransformer(kNames).description("around, none"));
+                  std::string(shown) + " (default; not around what masks cut out), or none: black")
+      ->transform(CLI::CheckedTransformer(hole_fills()).description("around, none"));
+}
+
+void add_fill_option(CLI::App& command, HoleFill& fill) {
+  add_fill_option(
+      command, fill, "What pictures show where nothing was reconstructed: the colours around it");
 }
 
 void add_scene_options(CLI::App& command, SceneOptions& options) {

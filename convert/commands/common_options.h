@@ -48,7 +48,11 @@ size_t stated_memory_limit(const CommonOptions& options);
 /// The same options without --memory-limit, for commands that plan no memory.
 void add_output_options(CLI::App& command, CommonOptions& options);
 
-/// --fill of commands that show a model.
+/// --fill.
+/// \param shown  what is shown by default where nothing was reconstructed, and in what
+void add_fill_option(CLI::App& command, HoleFill& fill, const char* shown);
+
+/// --fill of commands that show a model in pictures.
 void add_fill_option(CLI::App& command, HoleFill& fill);
 
 /// --assume-unit, --up, --known-distance, --marker-size, --control-points and --control-unit.

@@ -43,10 +43,10 @@ void add_surface_options(CLI::App& command, RunArguments& args) {
                      "its pixels, e.g. atlas=2mm; default photographs");
   add_local_origin_option(
       command, args.request.local_origin, "What is in web/, but for splats.spz,");
-  command.add_flag("--fill",
-                   args.request.fill,
-                   "Fill the holes of web/splats with pieces of what is around them, as splats "
-                   "tagged synthetic; nothing measures them. Default: they stay open");
+  add_fill_option(command,
+                  args.request.fill,
+                  "What web/splats show where nothing was reconstructed: pieces of what is around "
+                  "it, as splats tagged synthetic, which nothing measures");
   add_estimated_option(command, args.estimated);
   command
       .add_option(

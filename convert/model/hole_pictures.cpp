@@ -178,7 +178,7 @@ std::optional<PaintedView> painted_view(const Model& model,
 }
 
 HoleViews views_with_holes(const Model& model, const Progress& progress) {
-  HoleViews out = hole_views(model, progress);
+  HoleViews out = hole_views(model, {}, progress);
   if (out.cameras.empty()) {
     throw NumericalError("no hole is seen by any of " + std::to_string(out.candidates) +
                          " cameras around the input views");
@@ -261,26 +261,36 @@ PaintedPictures read_painted_pictures(const Model& model,
   return out;
 }
 
+std::vector<Camera> surroundings_views(const Model& model, const Progress& progress) {
+  return hole_views(model, holes_left_open, progress).cameras;
+}
+
 PaintedHoles paint_surroundings(const Model& model, const Progress& progress) {
-  const HoleViews chosen = views_with_holes(model, part_of(progress, 0, 0.5));
+  const std::vector<Camera> cameras = surroundings_views(model, part_of(progress, 0, 0.3));
+  return paint_surroundings(model, cameras, part_of(progress, 0.3, 1));
+}
+
+PaintedHoles paint_surroundings(const Model& model,
+                                const std::vector<Camera>& cameras,
+                                const Progress& progress) {
   PaintedHoles out;
   const auto paint = [&](size_t k, const ViewToPaint& view) {
     PaintedSurroundings painted = painted_surroundings(view);
     const std::string file = std::string(kSurroundingsFolder) + "/" + hole_name(k) + ".png";
     std::string png = encode_png(painted.picture);
     out.painted.names.push_back(hole_name(k));
-    out.painted.views.push_back({chosen.cameras[k],
+    out.painted.views.push_back({cameras[k],
                                  std::move(painted.picture),
                                  {file, sha256(png)},
                                  std::move(painted.left_open)});
     out.pictures[file] = std::move(png);
     return out.painted.views.back();
   };
-  out.fill = lift_painted(model, chosen.cameras, paint, part_of(progress, 0.5, 1));
+  out.fill = lift_painted(model, cameras, paint, progress);
   if (out.fill.gaussians.size() == 0) {
     throw NumericalError(
-        "nothing can be painted: all holes are looked at by a photograph, lie in "
-        "the sky, or are too far from what photographs show");
+        "nothing can be painted: holes are small, looked at by a photograph, in "
+        "the sky, or too far from what photographs show");
   }
   return out;
 }

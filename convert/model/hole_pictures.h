@@ -66,10 +66,20 @@ struct PaintedHoles {
   PaintedFill fill;
 };
 
-/// Paints the holes as seen from the cameras of hole_views() with painted_surroundings(), and makes
+/// Cameras to paint surroundings from: hole_views() of the holes that painted_surroundings() would
+/// fill.
+/// \throws InvalidInput, NumericalError as hole_views()
+std::vector<Camera> surroundings_views(const Model& model, const Progress& progress);
+
+/// Paints the holes as seen from surroundings_views() with painted_surroundings(), and makes
 /// Gaussians of them.
 /// \throws InvalidInput, NumericalError as write_hole_pictures(); NumericalError also if nothing can
 ///         be painted
 PaintedHoles paint_surroundings(const Model& model, const Progress& progress);
+
+/// The same as seen from other cameras.
+PaintedHoles paint_surroundings(const Model& model,
+                                const std::vector<Camera>& cameras,
+                                const Progress& progress);
 
 }  // namespace cgs

@@ -34,14 +34,18 @@ double masked_share(const Model& model) {
   return pixels > 0 ? masked / pixels : 1;
 }
 
-// Whether pictures may be completed where nothing is drawn. Around an object that was cut out by
-// masks, and where nothing is known of photographs, what is empty may be meant to be.
-bool may_complete(const Model& model, HoleFill fill) {
-  constexpr double kCutOut = 0.25;  // the rim that a wide lens leaves is half of that
-  return fill == HoleFill::Around && masked_share(model) < kCutOut;
+}  // namespace
+
+const std::map<std::string, HoleFill>& hole_fills() {
+  static const std::map<std::string, HoleFill> kNames = {{"around", HoleFill::Around},
+                                                         {"none", HoleFill::None}};
+  return kNames;
 }
 
-}  // namespace
+bool may_complete(const Model& model) {
+  constexpr double kCutOut = 0.25;  // the rim that a wide lens leaves is half of that
+  return masked_share(model) < kCutOut;
+}
 
 MaskMap valid_pixels(const Scene& scene, int view) {
   if (scene.views[static_cast<size_t>(view)].image_path.empty()) return {};
@@ -56,7 +60,7 @@ MaskMap valid_pixels(const Scene& scene, int view) {
 ModelPictures::ModelPictures(const Model& model, const PictureOptions& options)
     : model_(model),
       fill_(options.fill),
-      is_completed_(may_complete(model, options.fill)),
+      is_completed_(options.fill == HoleFill::Around && may_complete(model)),
       water_(options.through_water ? model.scene.water : std::nullopt) {}
 
 ColorImage ModelPictures::of(const RenderBuffers& buffers, const Camera& camera) const {

@@ -2,19 +2,24 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <string>
 
 #include "libcgs/reconstruct/model.h"
 #include "libcgs/render/render_buffers.h"
 
 namespace cgs {
 
-/// What pictures of a model show where nothing is drawn.
+/// What pictures and splats of a model show where nothing is drawn.
 enum class HoleFill : uint8_t {
   Around,  ///< What was painted there, else the colours around it, as filled_picture(), unless
            ///< photographs were masked.
   None,    ///< Black, as other programs draw splats.
 };
+
+/// By the names of --fill.
+const std::map<std::string, HoleFill>& hole_fills();
 
 /// What pictures of a model show.
 struct PictureOptions {
@@ -47,6 +52,10 @@ class ModelPictures {
   bool is_completed_;
   std::optional<Water> water_;
 };
+
+/// Whether holes of a model may be filled from around them: around an object that was cut out by
+/// masks, and where nothing is known of photographs, what is empty may be meant to be.
+bool may_complete(const Model& model);
 
 /// Where the photograph of a view may be looked at; empty = everywhere, also where it is gone.
 MaskMap valid_pixels(const Scene& scene, int view);

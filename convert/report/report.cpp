@@ -141,7 +141,7 @@ std::string thinning_section(const Json& report) {
   return html.str();
 }
 
-// What in web/splats no photograph saw; "" where nobody asked for that.
+// What in web/splats no photograph saw; "" with --fill none.
 std::string fill_paragraph(const Json& splats) {
   const std::string left_out = splats.value("left_out", Json::object()).value("fill", "");
   if (!left_out.empty()) {

@@ -49,6 +49,7 @@ RunRequest preview_request(const RunRequest& request,
   out.max_voxels = kPreviewVoxels;
   out.training.steps = 0;
   out.lods = 0;
+  out.fill = HoleFill::None;
   out.max_size = 0;
   out.max_error.clear();
   out.settings_reason = "a preview: small pictures, and Gaussians that were not trained";

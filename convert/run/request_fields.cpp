@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "convert/model/model_pictures.h"
 #include "convert/model/model_training.h"
 #include "convert/model/water_report.h"
 #include "io/bytes/content_hash.h"
@@ -71,6 +72,10 @@ void take(const Json& json, GlbEncoding& out) {
 Json kept(EstimatedSurface value) { return name_of(estimated_surfaces(), value); }
 void take(const Json& json, EstimatedSurface& out) {
   if (json.is_string()) out = estimated_surfaces().at(json.get<std::string>());
+}
+Json kept(HoleFill value) { return name_of(hole_fills(), value); }
+void take(const Json& json, HoleFill& out) {
+  if (json.is_string()) out = hole_fills().at(json.get<std::string>());
 }
 
 Json kept(Medium value) { return name_of(media(), value); }

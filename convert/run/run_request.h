@@ -8,6 +8,7 @@
 
 #include "convert/model/fusion.h"
 #include "convert/model/memory_plan.h"
+#include "convert/model/model_pictures.h"
 #include "convert/scene/scene_request.h"
 #include "io/meshes/gltf.h"
 #include "libcgs/train/training_options.h"
@@ -27,13 +28,13 @@ struct RunRequest {
   GlbEncoding glb_encoding = GlbEncoding::Draco;  ///< Of asset.glb.
   std::string texture = "photographs";            ///< Of the meshes: see atlas_texel().
   EstimatedSurface estimated = EstimatedSurface::FillOnly;
-  std::string max_error;      ///< Promise: how far the written meshes lie from the fused
-                              ///< surface at most; empty = none.
-  bool fill = false;          ///< Of web/splats, as WebSplatsOptions.
-  bool local_origin = false;  ///< Of asset.glb, its levels and splats.glb, as GlbOptions.
-  size_t lods = 0;            ///< Coarser levels of asset.glb, 0 to kMostLods.
-  size_t max_size = 0;        ///< Promise: largest asset.glb [bytes]; 0 = any.
-  size_t memory_limit = 0;    ///< [bytes]; 0 = 80 % of what is free.
+  std::string max_error;             ///< Promise: how far the written meshes lie from the fused
+                                     ///< surface at most; empty = none.
+  HoleFill fill = HoleFill::Around;  ///< Of web/splats.
+  bool local_origin = false;         ///< Of asset.glb, its levels and splats.glb, as GlbOptions.
+  size_t lods = 0;                   ///< Coarser levels of asset.glb, 0 to kMostLods.
+  size_t max_size = 0;               ///< Promise: largest asset.glb [bytes]; 0 = any.
+  size_t memory_limit = 0;           ///< [bytes]; 0 = 80 % of what is free.
   bool overwrite = false;
   std::string settings_reason;  ///< Why size and training are these, for the report; may be empty.
 };

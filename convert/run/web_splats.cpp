@@ -60,18 +60,6 @@ Gaussians merged_fill(const PaintedHoles& made, const std::optional<float>& most
   return merge_splats(weigh_splats(made.fill.gaussians, cameras), {.most_cost = *most_cost}).splats;
 }
 
-void fill_holes(const Model& model, WebSplats& out, const Progress& progress) {
-  try {
-    PaintedHoles made = paint_surroundings(model, progress);
-    out.fill = WebFill{merged_fill(made, out.thinned.most_cost),
-                       std::move(made.pictures),
-                       open_share(made.fill),
-                       {}};
-  } catch (const NumericalError& error) {
-    out.fill_left_out = error.what();
-  }
-}
-
 /// Two sets change places for as long as this lives: a model is large to copy.
 class Exchange {
  public:
@@ -84,6 +72,25 @@ class Exchange {
   Gaussians& a_;
   Gaussians& b_;
 };
+
+// Of the splats that are left: these are what it must stay hidden behind.
+void fill_holes(Model& model, WebSplats& out, const Progress& progress) {
+  if (!may_complete(model)) {
+    out.fill_left_out = "masks cut out more than a quarter of the photographs";
+    return;
+  }
+  try {
+    const std::vector<Camera> cameras = surroundings_views(model, part_of(progress, 0, 0.2));
+    const Exchange exchange(model.gaussians, out.thinned.splats);
+    PaintedHoles made = paint_surroundings(model, cameras, part_of(progress, 0.2, 1));
+    out.fill = WebFill{merged_fill(made, out.thinned.most_cost),
+                       std::move(made.pictures),
+                       open_share(made.fill),
+                       {}};
+  } catch (const NumericalError& error) {
+    out.fill_left_out = error.what();
+  }
+}
 
 // What the model rests on, of which these splats are no longer one per pixel; "" where nobody says.
 std::string evidence_of_thinned(const Model& model, size_t kept) {
@@ -117,10 +124,11 @@ WebSplats write_web_splats(const std::filesystem::path& folder,
   const Eigen::Matrix3d y_up = y_up_from(frame.up);
   make_output_folder(folder);
   WebSplats out;
-  const double thinned = options.fill ? 0.5 : 0.9;
+  const bool fills = options.fill == HoleFill::Around;
+  const double thinned = fills ? 0.5 : 0.9;
   out.thinned = thinned_splats(model, part_of(progress, 0, thinned));
   out.of = model.gaussians.size();
-  if (options.fill) fill_holes(model, out, part_of(progress, thinned, 0.9));
+  if (fills) fill_holes(model, out, part_of(progress, thinned, 0.9));
   out.held_out_of_all = held_out_figures(model, part_of(progress, 0.9, 0.93));
   out.held_out = held_out_figures(model, out.thinned.splats, part_of(progress, 0.93, 0.96));
   Gaussians filled;

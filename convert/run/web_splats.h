@@ -17,8 +17,8 @@
 namespace cgs {
 
 struct WebSplatsOptions {
-  bool fill = false;          ///< Fill holes with pieces of what is around them.
-  bool local_origin = false;  ///< Of splats.glb, as SplatGlbOptions.
+  HoleFill fill = HoleFill::None;  ///< Around: with pieces of what is around them.
+  bool local_origin = false;       ///< Of splats.glb, as SplatGlbOptions.
 };
 
 /// What was painted into the holes, and follows the splats of the model.
@@ -38,7 +38,7 @@ struct WebSplats {
   /// out.
   std::optional<ViewFigures> held_out;
   std::optional<ViewFigures> held_out_of_all;  ///< Likewise, of the splats of the model.
-  std::optional<WebFill> fill;                 ///< Empty if nobody asked, or:
+  std::optional<WebFill> fill;                 ///< Empty if not asked for, or:
   std::string fill_left_out;                   ///< Why there is none, for people.
   size_t glb_bytes = 0;
   std::optional<SpzReport> spz;
@@ -56,7 +56,7 @@ nlohmann::ordered_json web_splats_to_json(const WebSplats& made);
 /// has no place for these.
 ///
 /// A fill is that of paint_surroundings(), merged as the others are; its pictures lie beside the
-/// files. Where nothing can be painted, it is left out.
+/// files. Where nothing can be painted, or photographs are cut out by masks, it is left out.
 /// \param model  as before when this returns or throws
 /// \throws Error as load_images()
 WebSplats write_web_splats(const std::filesystem::path& folder,

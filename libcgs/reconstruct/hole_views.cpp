@@ -3,15 +3,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
+#include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/nan.h"
+#include "libcgs/core/splat_selection.h"
 #include "libcgs/core/thinned.h"
 #include "libcgs/reconstruct/camera_path.h"
 #include "libcgs/reconstruct/next_view.h"
 #include "libcgs/render/hidden_depth.h"
+#include "libcgs/render/rasterizer.h"
+#include "libcgs/render/support.h"
 
 namespace cgs {
 
@@ -53,14 +60,54 @@ struct SeenHoles {
   DepthMap depth;  ///< Of its holes; NaN elsewhere.
 };
 
-SeenHoles holes_of(const Model& model, const std::vector<SupportView>& inputs, const Camera& from) {
-  constexpr int kSide = 120;  // [pixels]; which holes a camera sees needs no detail
-  SeenHoles out{resized_to_fit(from, kSide), {}};
-  const RenderBuffers buffers = render_camera(model, inputs, out.camera);
+constexpr int kCoarseSide = 120;  // [pixels]; which holes a camera sees needs no detail
+
+// Of every few neighbours in a view's lattice one, as large as they are together, so that they are
+// as fine as pictures of kCoarseSide need. All where they are on no lattice any more.
+Gaussians coarse_gaussians(const Model& model) {
+  const Gaussians& all = model.gaussians;
+  std::vector<uint8_t> keep;
+  std::vector<float> larger;
+  for (const ViewPriors& priors : model.priors) {
+    const DepthMap& depth = priors.depth;
+    const int step = std::max(1, std::max(depth.width, depth.height) / kCoarseSide);
+    for (size_t i = 0; i < depth.data.size(); ++i) {
+      if (!draws(priors, i)) continue;
+      const auto [x, y] =
+          std::pair(static_cast<int>(i) % depth.width, static_cast<int>(i) / depth.width);
+      keep.push_back(x % step == step / 2 && y % step == step / 2 ? 1 : 0);
+      if (keep.back() != 0) larger.push_back(static_cast<float>(step));
+    }
+  }
+  Gaussians out = all;
+  if (keep.size() != all.size()) return out;
+  keep_only(out, keep);
+  for (size_t i = 0; i < out.size(); ++i) out.scale[i] *= larger[i];
+  return out;
+}
+
+using HolesLeftOpen = std::function<MaskMap(const ViewToPaint&)>;
+
+SeenHoles holes_of(const Gaussians& gaussians,
+                   const std::vector<SupportView>& inputs,
+                   const HolesLeftOpen& left_open,
+                   const Camera& from) {
+  SeenHoles out{resized_to_fit(from, kCoarseSide), {}};
+  RenderBuffers buffers = rasterize(gaussians, out.camera);
+  annotate_support(buffers, out.camera, inputs);
   MaskMap open(out.camera.width, out.camera.height, 0);
   for (size_t i = 0; i < open.data.size(); ++i)
     open.data[i] = is_hole(buffers.hole.data[i]) ? 1 : 0;
   out.depth = hidden_depth(buffers, open);
+  if (!left_open) return out;
+  const MaskMap left = left_open({out.camera, inputs, buffers, open, out.depth});
+  size_t painted = 0;
+  for (size_t i = 0; i < left.data.size(); ++i) {
+    if (left.data[i] != 0) out.depth.data[i] = kNaN;
+    painted += out.depth.data[i] > 0 ? 1 : 0;
+  }
+  constexpr size_t kWorth = 400;  // of the picture
+  if (kWorth * painted < left.data.size()) std::ranges::fill(out.depth.data, kNaN);
   return out;
 }
 
@@ -110,7 +157,7 @@ size_t gain(const Sight& sight, const Sight& seen) {
 
 }  // namespace
 
-HoleViews hole_views(const Model& model, const Progress& progress) {
+HoleViews hole_views(const Model& model, const HolesLeftOpen& left_open, const Progress& progress) {
   require(!model.priors.empty(),
           "what is a hole is told by the input views of a model; the number of these",
           model.priors.size());
@@ -118,10 +165,11 @@ HoleViews hole_views(const Model& model, const Progress& progress) {
   constexpr size_t kMostPoints = 100'000;
   const std::vector<Camera> around = thinned(cameras_around(model), kMostCandidates);
   const std::vector<SupportView> inputs = support_views(model);
+  const Gaussians coarse = coarse_gaussians(model);
   std::vector<SeenHoles> candidates;
   for (size_t k = 0; k < around.size(); ++k) {
     report(progress, double(k) / double(around.size()));
-    candidates.push_back(holes_of(model, inputs, around[k]));
+    candidates.push_back(holes_of(coarse, inputs, left_open, around[k]));
   }
   const std::vector<Eigen::Vector3d> points = thinned(points_of(candidates), kMostPoints);
   const std::vector<Sight> sights = sights_of(candidates, points);

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "libcgs/core/camera.h"
 #include "libcgs/core/progress.h"
+#include "libcgs/core/raster.h"
 #include "libcgs/reconstruct/model.h"
+#include "libcgs/reconstruct/painted_fill.h"
 
 namespace cgs {
 
@@ -25,9 +28,13 @@ struct HoleViews {
 /// a hole of its own with a depth that agrees within a tenth. Chosen is the camera that sees the
 /// most points that none chosen before sees, until 95 % are seen, at most six.
 ///
+/// \param left_open  which holes of a view will stay open all the same (1): they are not looked for,
+///                   nor are those of a view that has others on less than a 400th of its picture
 /// \throws InvalidInput if the model has no input views; NumericalError if no depth is known
 /// Source: greedy cover, Nemhauser et al. 1978, "An analysis of approximations for maximizing
 ///         submodular set functions": at least 63 % of what the best choice of as many sees.
-HoleViews hole_views(const Model& model, const Progress& progress = {});
+HoleViews hole_views(const Model& model,
+                     const std::function<MaskMap(const ViewToPaint&)>& left_open = {},
+                     const Progress& progress = {});
 
 }  // namespace cgs

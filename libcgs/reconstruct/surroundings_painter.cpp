@@ -82,6 +82,18 @@ void spread_over_gaps(const MaskMap& open, MaskMap& left_open) {
   }
 }
 
+// Depth as exemplar_fill() takes it.
+DepthMap depth_of_pieces(const ViewToPaint& view, const MaskMap& left_open) {
+  DepthMap out = view.shown.median_depth;
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    if (view.shown.hole.data[i] == Hole::Sky) out.data[i] = kNaN;
+    if (view.open.data[i] != 0) out.data[i] = left_open.data[i] != 0 ? 0 : view.hidden.data[i];
+  }
+  return out;
+}
+
+}  // namespace
+
 MaskMap holes_left_open(const ViewToPaint& view) {
   constexpr int kWidths = 12;
   const Raster<NextShown> next = next_shown(view);
@@ -101,18 +113,6 @@ MaskMap holes_left_open(const ViewToPaint& view) {
   }
   return out;
 }
-
-// Depth as exemplar_fill() takes it.
-DepthMap depth_of_pieces(const ViewToPaint& view, const MaskMap& left_open) {
-  DepthMap out = view.shown.median_depth;
-  for (size_t i = 0; i < out.data.size(); ++i) {
-    if (view.shown.hole.data[i] == Hole::Sky) out.data[i] = kNaN;
-    if (view.open.data[i] != 0) out.data[i] = left_open.data[i] != 0 ? 0 : view.hidden.data[i];
-  }
-  return out;
-}
-
-}  // namespace
 
 PaintedSurroundings painted_surroundings(const ViewToPaint& view) {
   PaintedSurroundings out;

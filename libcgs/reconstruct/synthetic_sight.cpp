@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -103,29 +105,46 @@ SyntheticSight::SyntheticSight(const Model& model)
   }
 }
 
-std::vector<uint8_t> SyntheticSight::hidden_ones(const Gaussians& fill, double reach) const {
+std::vector<SyntheticSight::Showing> SyntheticSight::showing(
+    const Gaussians& fill, const std::vector<size_t>& views) const {
   Gaussians together = dark_;
   append(together, in_one_color(fill, 1));
+  std::vector<Showing> out;
+  for (const size_t k : views) {
+    MaskMap pixels = showing_pixels(rasterize(together, input_camera(model_, k)), holes_[k]);
+    if (has_any_set(pixels)) out.push_back({k, std::move(pixels)});
+  }
+  return out;
+}
+
+std::vector<uint8_t> SyntheticSight::hidden_ones(const Gaussians& fill,
+                                                 const std::vector<Showing>& showing,
+                                                 double reach) const {
   std::vector<uint8_t> keep(fill.size(), 1);
-  for (size_t k = 0; k < holes_.size(); ++k) {
-    const Camera& camera = input_camera(model_, k);
-    const MaskMap showing = showing_pixels(rasterize(together, camera), holes_[k]);
-    if (!has_any_set(showing)) continue;
+  for (const Showing& shown : showing) {
+    const Camera& camera = input_camera(model_, shown.view);
     const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
     tbb::parallel_for(size_t{0}, fill.size(), [&](size_t i) {
       const float scale = fill.scale[i].maxCoeff();
       const Eigen::Vector3d in_cam = cam_from_world * fill.position[i].cast<double>();
       const Eigen::Vector3d uvz = camera.project_in_cam(in_cam);
-      if (touches(showing, camera, uvz, scale, reach)) keep[i] = 0;
+      if (touches(shown.pixels, camera, uvz, scale, reach)) keep[i] = 0;
     });
   }
   return keep;
 }
 
 void SyntheticSight::drop_visible(Gaussians& fill) const {
+  std::vector<size_t> views(holes_.size());
+  std::iota(views.begin(), views.end(), size_t{0});
+  std::vector<Showing> left = showing(fill, views);
   // First what is mostly drawn there; then all that may be, as far as alpha reaches 1/255.
   for (const double reach : {1.0, 3.5}) {
-    while (fill.size() > 0 && keep_only(fill, hidden_ones(fill, reach)) > 0) {
+    while (!left.empty() && keep_only(fill, hidden_ones(fill, left, reach)) > 0) {
+      // Without some of it no view shows more of the rest than it did of all.
+      views.clear();
+      for (const Showing& shown : left) views.push_back(shown.view);
+      left = showing(fill, views);
     }
   }
 }

@@ -33,8 +33,18 @@ class SyntheticSight {
   void drop_visible(Gaussians& fill) const;
 
  private:
-  // 0 = a view shows too much of it, looking for what is drawn within so many of its sigmas.
-  std::vector<uint8_t> hidden_ones(const Gaussians& fill, double reach) const;
+  /// An input view and the pixels of it that show too much of a fill.
+  struct Showing {
+    size_t view = 0;
+    MaskMap pixels;
+  };
+
+  // Those of `views` that show too much of it anywhere.
+  std::vector<Showing> showing(const Gaussians& fill, const std::vector<size_t>& views) const;
+  // 0 = is drawn in these pixels, within so many of its sigmas.
+  std::vector<uint8_t> hidden_ones(const Gaussians& fill,
+                                   const std::vector<Showing>& showing,
+                                   double reach) const;
 
   const Model& model_;
   Gaussians dark_;                   // those of the model, in black

@@ -20,8 +20,9 @@ enum class MembranePixel : uint8_t {
 /// \param values   those of open pixels are where it starts, and what is found; finite
 /// \param pixels   of the same size
 /// \param reach    [pixels] over which it falls to 0 by a factor of e; 0 = it is not drawn to 0
-/// \param sweeps   over all pixels; the way to go in a gap is about half its width squared, less
-///                 what the start is right about
+/// \param sweeps   over all pixels, at most: fewer where none moves any more, by a millionth of the
+///                 largest value; the way to go in a gap is about half its width squared, less what
+///                 the start is right about
 /// Source: Pérez et al. 2003, "Poisson Image Editing", section 2, of a field without guidance;
 ///         successive over-relaxation, red and black pixels in turn (Young 1954).
 void relax_membrane(Raster<float>& values,

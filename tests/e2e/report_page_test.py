@@ -46,7 +46,7 @@ def setUpModule():
     crop_and_stretch(capture, 'view_02')
     # Metres that are not the units of the files, so that no figure is right by chance.
     subprocess.run([CGS, 'run', capture, '--views', 'view_01,view_02,view_03', '--assume-unit', 'ft',
-                    '--set', 'steps=0', '--voxel-size', '3cm', '--fill', '-q', '-o', OUT], check=True)
+                    '--set', 'steps=0', '--voxel-size', '3cm', '-q', '-o', OUT], check=True)
 
 
 def crop_and_stretch(capture, name):

@@ -98,14 +98,14 @@ THREE = ["--views", "view_01,view_02,view_03"]
 def test_runs():
     """With a scale and held-out views, and without either; one that goes on; what changed."""
     told = cgs("run", capture, "--views", "view_01,view_03", *DRAFT, "--assume-unit", "m",
-               "--lods", "1", "--refine-poses", "-o", "metric")
+               "--lods", "1", "--refine-poses", "--fill", "none", "-o", "metric")
     assert told["evaluation"]["views"] and told["units"] == "m" and told["web"]["levels"]
     assert "refined_poses" in told and told["mesh"]["output"]["left_out"] == {}
     cameras = json.loads((capture / "transforms.json").read_text())
     cameras["frames"] = cameras["frames"][:3]
     shutil.copytree(capture / "images", work / "cut/images")
     (work / "cut/transforms.json").write_text(json.dumps(cameras))
-    told = cgs("run", "cut", "--preset", "draft", "--set", "steps=2", "--max-size", "60kB", "--fill",
+    told = cgs("run", "cut", "--preset", "draft", "--set", "steps=2", "--max-size", "60kB",
                "--max-error", "0.5", "--estimated", "keep",
                "--local-origin", "--use-all", "--old-photographs", "--texture", "atlas", "-o", "plain")
     assert told["web"]["texture"]["atlas"]["charts"] > 0

@@ -46,7 +46,7 @@ RunRequest unusual_request(const test::TempDir& dir) {
   out.compression_error = "1mm";
   out.max_error = "3mm";
   out.max_size = 123456;
-  out.fill = true;
+  out.fill = HoleFill::None;
   out.local_origin = true;
   out.lods = 2;
   out.glb_encoding = GlbEncoding::Quantized;

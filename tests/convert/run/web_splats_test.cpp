@@ -46,7 +46,7 @@ TEST(WriteWebSplats, FillsHolesWithSplatsThatAreTagged) {
   Model model = test::panel_model();
   for (View& view : model.scene.views) view.image_path.clear();  // none to thin by
   const size_t before = model.gaussians.size();
-  const WebSplats made = write_web_splats(dir.path(), model, {.fill = true});
+  const WebSplats made = write_web_splats(dir.path(), model, {.fill = HoleFill::Around});
   ASSERT_TRUE(made.fill.has_value());
   EXPECT_EQ(model.gaussians.size(), before);
   const size_t count = made.fill->splats.size();

@@ -43,6 +43,20 @@ TEST(HoleViews, LooksFromViewsHeldOut) {
   EXPECT_EQ(with.candidates, hole_views(model).candidates + 1);
 }
 
+// What stays open all the same is not looked for.
+TEST(HoleViews, AreOfWhatWillBeFilled) {
+  const Model model = test::panel_model();
+  const auto all = [](const ViewToPaint& view) { return view.open; };
+  EXPECT_TRUE(hole_views(model, all).cameras.empty());
+  const auto from_the_left = [](const ViewToPaint& view) {
+    const bool is_left = view.camera.center().x() < 0;
+    return is_left ? view.open : MaskMap(view.open.width, view.open.height, 0);
+  };
+  const HoleViews found = hole_views(model, from_the_left);
+  ASSERT_FALSE(found.cameras.empty());
+  for (const Camera& camera : found.cameras) EXPECT_GE(camera.center().x(), 0);
+}
+
 TEST(HoleViews, NeedInputViews) {
   Model bare = test::panel_model();
   bare.priors.clear();
