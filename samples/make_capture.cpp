@@ -5,7 +5,7 @@
 // dates.
 //
 // usage: cgs_make_capture OUT [--scene portal|courtyard|vase|facade|reef|reef-later]
-//                             [--downscale N] [--views NAME,...] [--water]
+//                             [--downscale N] [--views NAME,...] [--water [--lamp M]]
 #include <algorithm>
 #include <exception>
 #include <filesystem>
@@ -64,6 +64,13 @@ int run(int argc, char** argv) {
                is_under_water,
                "Photographs are taken through water; capture.json states it, pictures without it "
                "are truth/VIEW_clear.png");
+  double lamp_range = 0;
+  app.add_option("--lamp",
+                 lamp_range,
+                 "The water is lit by a lamp at the camera alone, at this range [m] as brightly as "
+                 "without water")
+      ->needs("--water")
+      ->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   auto [made, views, only] = planted(scene, downscale);
   const auto inputs = cgs::input_cameras(views);
@@ -78,7 +85,7 @@ int run(int argc, char** argv) {
     });
   }
   std::optional<cgs::PlantedWater> water;
-  if (is_under_water) water.emplace();
+  if (is_under_water) water.emplace().lamp_range = lamp_range;
   cgs::write_capture(out, made, views, inputs, water);
   if (!only.empty()) cgs::write_masks(out, made, views, only);
   return 0;

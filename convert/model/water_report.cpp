@@ -34,6 +34,14 @@ std::string three_with_sigma(const Eigen::Vector3d& value, const Eigen::Vector3d
   return text.data();
 }
 
+// How much less light of a lamp gets to what is farther away; "" without one.
+std::string lamp_words(const Json& water) {
+  if (!water.contains("lamp_range")) return "";
+  return ", times (" + number(water["lamp_range"], "%.2f") + " " +
+         escaped(water["unit"].get<std::string>()) +
+         " / range)<sup>2</sup>, as a lamp at the camera lights it";
+}
+
 std::string words_without_water() {
   std::array<char, 160> text{};
   std::snprintf(text.data(),
@@ -58,19 +66,22 @@ Json water_json(const Water& water, const Frame& frame) {
   const Eigen::Vector3d attenuation_sigma = water.attenuation_sigma / unit.length;
   const Eigen::Vector3d backscatter = water.backscatter / unit.length;
   const Eigen::Vector3d backscatter_sigma = water.backscatter_sigma / unit.length;
-  return {{"words",
-           "water was taken out of the photographs; of red, green, blue light: attenuation " +
-               three_with_sigma(attenuation, attenuation_sigma) + " and backscatter " +
-               three_with_sigma(backscatter, backscatter_sigma) + " per " +
-               (unit.name == "units" ? "unit" : unit.name) + ", veil " +
-               three_with_sigma(water.veil, water.veil_sigma)},
-          {"unit", unit.name},
-          {"attenuation", rgb(attenuation)},
-          {"attenuation_sigma", rgb(attenuation_sigma)},
-          {"backscatter", rgb(backscatter)},
-          {"backscatter_sigma", rgb(backscatter_sigma)},
-          {"veil", rgb(water.veil)},
-          {"veil_sigma", rgb(water.veil_sigma)}};
+  Json out = {{"words",
+               "water was taken out of the photographs; of red, green, blue light: attenuation " +
+                   three_with_sigma(attenuation, attenuation_sigma) + " and backscatter " +
+                   three_with_sigma(backscatter, backscatter_sigma) + " per " +
+                   (unit.name == "units" ? "unit" : unit.name) + ", veil " +
+                   three_with_sigma(water.veil, water.veil_sigma) +
+                   (water.lamp_range > 0 ? "; lit by a lamp at the camera" : "")},
+              {"unit", unit.name},
+              {"attenuation", rgb(attenuation)},
+              {"attenuation_sigma", rgb(attenuation_sigma)},
+              {"backscatter", rgb(backscatter)},
+              {"backscatter_sigma", rgb(backscatter_sigma)},
+              {"veil", rgb(water.veil)},
+              {"veil_sigma", rgb(water.veil_sigma)}};
+  if (water.lamp_range > 0) out["lamp_range"] = water.lamp_range * unit.length;
+  return out;
 }
 
 Json water_to_json(const WaterEstimate& found, const Frame& frame) {
@@ -95,8 +106,9 @@ std::string water_section(const Json& water) {
        << " places that two photographs show, nine of ten from ranges "
           "within "
        << percent(Json(water["range_ratio"].get<double>() - 1))
-       << " of each other. Light of a surface arrives as exp(-attenuation x range), and water "
-          "before it adds veil "
+       << " of each other. Light of a surface arrives as exp(-attenuation x range)"
+       << lamp_words(water)
+       << ", and water before it adds veil "
           "x (1 - exp(-backscatter x range)); the veil is linear light, 1 = white. All results are "
           "made of the restored photographs below; held-out views are rendered through the "
           "water.</p>\n<table>\n<tr><th></th><th>red</th><th>green</th><th>blue</th></tr>\n";

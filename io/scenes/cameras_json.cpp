@@ -47,6 +47,7 @@ constexpr std::array<std::pair<const char*, Eigen::Vector3d Water::*>, 6> kWater
 Json water_json(const Water& water) {
   Json out = Json::object();
   for (const auto& [name, field] : kWaterFields) out[name] = vector_json(water.*field);
+  if (water.lamp_range > 0) out["lamp_range"] = water.lamp_range;
   return out;
 }
 
@@ -165,6 +166,12 @@ Water read_water(const JsonValue& value) {
     }
   }
   if (out.veil.maxCoeff() > 1) value.at("veil").fail(Defect::Value, "must be <= 1");
+  if (const auto lamp = value.find("lamp_range")) {
+    out.lamp_range = lamp->number();
+    if (!(out.lamp_range > 0 && std::isfinite(out.lamp_range))) {
+      lamp->fail(Defect::Value, "must be > 0");
+    }
+  }
   return out;
 }
 

@@ -81,7 +81,8 @@ ColorImage changed_light(const ColorImage& image,
 }  // namespace
 
 Eigen::Vector3d Water::transmission(double range) const {
-  return (-range * attenuation.array()).exp();
+  const double falloff = lamp_range > 0 ? lamp_range / range : 1;
+  return falloff * falloff * (-range * attenuation.array()).exp();
 }
 
 Eigen::Vector3d Water::haze(double range) const {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <set>
 #include <string>
 
 #include <Eigen/Cholesky>
@@ -17,14 +18,21 @@
 
 namespace cgs {
 
-WaterResidual water_residual(const WaterMatch& match, int channel, const WaterChannel& water) {
+WaterResidual water_residual(const WaterMatch& match,
+                             int channel,
+                             const WaterChannel& water,
+                             WaterLight light) {
   const double behind_a = std::exp(-water.backscatter * match.range_a);
   const double behind_b = std::exp(-water.backscatter * match.range_b);
   const double own_a = match.light_a[channel] - water.veil * (1 - behind_a);
   const double own_b = match.light_b[channel] - water.veil * (1 - behind_b);
   // The transmissions over their norm, by their ratio: each may be too small for a number.
   const double farther = match.range_a - match.range_b;
-  const double ratio = std::exp(water.attenuation * farther);  // t_b / t_a
+  double ratio = std::exp(water.attenuation * farther);  // t_b / t_a
+  if (light == WaterLight::Lamp) {
+    const double falloff = match.range_a / match.range_b;
+    ratio *= falloff * falloff;
+  }
   const double a = 1 / std::sqrt(1 + ratio * ratio);
   const double b = 1 / std::sqrt(1 + 1 / (ratio * ratio));
   WaterResidual out;
@@ -41,7 +49,8 @@ namespace {
 /// of matches under a robust loss.
 class ChannelFit {
  public:
-  ChannelFit(const WaterEvidence& scaled, int channel) : evidence_(scaled), channel_(channel) {}
+  ChannelFit(const WaterEvidence& scaled, int channel, WaterLight light)
+      : evidence_(scaled), channel_(channel), light_(light) {}
 
   /// From three starts, the end that leaves the smallest differences.
   WaterChannel best() {
@@ -64,7 +73,7 @@ class ChannelFit {
     const Normal normal = normal_at(at, Loss::Tukey);
     std::map<size_t, Eigen::Vector3d> of_group;
     for (const WaterMatch& match : evidence_.matches) {
-      const WaterResidual r = water_residual(match, channel_, at);
+      const WaterResidual r = residual(match, at);
       const double weight = weight_of(r.value, Loss::Tukey) / (scale_ * scale_);
       of_group.try_emplace(match.group, Eigen::Vector3d::Zero()).first->second +=
           weight * r.value * r.gradient;
@@ -143,7 +152,7 @@ class ChannelFit {
     out.matrix = out.of_priors;
     const double square = scale_ * scale_;
     for (const WaterMatch& match : evidence_.matches) {
-      const WaterResidual r = water_residual(match, channel_, at);
+      const WaterResidual r = residual(match, at);
       const double weight = weight_of(r.value, loss) / square;
       out.cost += loss_of(r.value, loss);
       out.matrix += weight * r.gradient * r.gradient.transpose();
@@ -157,7 +166,7 @@ class ChannelFit {
     add_priors(at, priors);
     double out = priors.cost;
     for (const WaterMatch& match : evidence_.matches) {
-      out += loss_of(water_residual(match, channel_, at).value, loss);
+      out += loss_of(residual(match, at).value, loss);
     }
     return out;
   }
@@ -165,7 +174,7 @@ class ChannelFit {
   double mean_difference(const WaterChannel& at) const {
     double sum = 0;
     for (const WaterMatch& match : evidence_.matches) {
-      sum += std::abs(water_residual(match, channel_, at).value);
+      sum += std::abs(residual(match, at).value);
     }
     return sum / static_cast<double>(evidence_.matches.size());
   }
@@ -175,7 +184,7 @@ class ChannelFit {
     constexpr double kLeast = 1e-5;  // far below the steps of a photograph
     std::vector<double> all;
     for (const WaterMatch& match : evidence_.matches) {
-      all.push_back(std::abs(water_residual(match, channel_, at).value));
+      all.push_back(std::abs(residual(match, at).value));
     }
     return std::max(kLeast, 1.4826 * median(all));
   }
@@ -233,8 +242,13 @@ class ChannelFit {
     return at;
   }
 
+  WaterResidual residual(const WaterMatch& match, const WaterChannel& at) const {
+    return water_residual(match, channel_, at, light_);
+  }
+
   const WaterEvidence& evidence_;
   int channel_;
+  WaterLight light_;
   double scale_ = 1;
 };
 
@@ -282,6 +296,53 @@ void refuse_doubt(const Eigen::Vector3d& doubt, const WaterEstimate& found) {
   throw WithRemedy<NumericalError>(Remedy::NoWater, text.data());
 }
 
+/// The fits of all channels, in units in which the median range is 1.
+struct WaterFit {
+  std::array<WaterChannel, 3> best;
+  std::array<Eigen::Vector3d, 3> sigma;
+  Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+};
+
+WaterFit fit_channels(const WaterEvidence& scaled, WaterLight light) {
+  WaterFit out;
+  tbb::parallel_for(size_t{0}, size_t{3}, [&](size_t c) {
+    ChannelFit fit(scaled, static_cast<int>(c), light);
+    out.best.at(c) = fit.best();
+    out.sigma.at(c) = fit.sigma(out.best.at(c));
+    out.residual[static_cast<Eigen::Index>(c)] = fit.scale();
+  });
+  return out;
+}
+
+size_t count_of_groups(const std::vector<WaterMatch>& matches) {
+  std::set<size_t> groups;
+  for (const WaterMatch& match : matches) groups.insert(match.group);
+  return groups.size();
+}
+
+// Both have as many parameters: what is left decides, if it is more than chance and blur make.
+bool explains_more(const WaterFit& lamp, const WaterFit& everywhere, size_t residuals) {
+  constexpr double kNats = 10;
+  constexpr double kSmaller = 0.05;
+  const double gain = (everywhere.residual.array() / lamp.residual.array()).log().sum();
+  return gain / 3 >= kSmaller && gain * static_cast<double>(residuals) >= kNats;
+}
+
+// In ranges of the matches.
+Water water_of(const WaterFit& fit, double range) {
+  Water out;
+  for (int c = 0; c < 3; ++c) {
+    const auto k = static_cast<size_t>(c);
+    out.attenuation[c] = fit.best.at(k).attenuation / range;
+    out.backscatter[c] = fit.best.at(k).backscatter / range;
+    out.veil[c] = fit.best.at(k).veil;
+    out.attenuation_sigma[c] = fit.sigma.at(k).x() / range;
+    out.backscatter_sigma[c] = fit.sigma.at(k).y() / range;
+    out.veil_sigma[c] = fit.sigma.at(k).z();
+  }
+  return out;
+}
+
 }  // namespace
 
 WaterEstimate fit_water(const WaterEvidence& evidence) {
@@ -298,25 +359,17 @@ WaterEstimate fit_water(const WaterEvidence& evidence) {
   out.range = median_range(evidence.matches);
   out.range_ratio = usual_ratio(evidence.matches);
   const WaterEvidence scaled = in_ranges_of(evidence, out.range);
-  Water water;
-  Eigen::Vector3d doubt;
-  tbb::parallel_for(0, 3, [&](int c) {
-    ChannelFit fit(scaled, c);
-    const WaterChannel best = fit.best();
-    const Eigen::Vector3d sigma = fit.sigma(best);
-    water.attenuation[c] = best.attenuation / out.range;
-    water.backscatter[c] = best.backscatter / out.range;
-    water.veil[c] = best.veil;
-    water.attenuation_sigma[c] = sigma.x() / out.range;
-    water.backscatter_sigma[c] = sigma.y() / out.range;
-    water.veil_sigma[c] = sigma.z();
-    doubt[c] = sigma.x();
-    out.residual[c] = fit.scale();
-  });
-  refuse_doubt(doubt, out);
+  WaterFit fit = fit_channels(scaled, WaterLight::Everywhere);
+  const WaterFit with_lamp = fit_channels(scaled, WaterLight::Lamp);
+  const bool has_lamp = explains_more(with_lamp, fit, count_of_groups(scaled.matches));
+  if (has_lamp) fit = with_lamp;
+  Water water = water_of(fit, out.range);
+  if (has_lamp) water.lamp_range = out.range;
+  out.residual = fit.residual;
+  refuse_doubt(water.attenuation_sigma * out.range, out);
   constexpr double kSure = 2;  // standard deviations
   const double least = (water.attenuation - kSure * water.attenuation_sigma).maxCoeff();
-  if (1 - std::exp(-least * out.range) >= kLeastLoss) out.water = water;
+  if (has_lamp || 1 - std::exp(-least * out.range) >= kLeastLoss) out.water = water;
   return out;
 }
 

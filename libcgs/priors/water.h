@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -13,6 +14,9 @@
 #include "libcgs/priors/water_evidence.h"
 
 namespace cgs {
+
+/// What the surface is lit by.
+enum class WaterLight : uint8_t { Everywhere, Lamp };
 
 /// One channel of Water, in any unit of length.
 struct WaterChannel {
@@ -29,14 +33,17 @@ struct WaterResidual {
 };
 
 /// The light of the surface itself is unknown. Of two photographs of it, with t = exp(-attenuation
-/// R) and h the haze at its range, least squares over that light leave
+/// R), over R^2 with a lamp, and h the haze at its range, least squares over that light leave
 ///
 ///   (t_b (I_a - h_a) - t_a (I_b - h_b)) / sqrt(t_a^2 + t_b^2),
 ///
 /// in which noise of both photographs counts as it does in them, however dim one is.
 /// Source: Golub and Pereyra 1973, "The Differentiation of Pseudo-Inverses and Nonlinear Least
 /// Squares Problems Whose Variables Separate".
-WaterResidual water_residual(const WaterMatch& match, int channel, const WaterChannel& water);
+WaterResidual water_residual(const WaterMatch& match,
+                             int channel,
+                             const WaterChannel& water,
+                             WaterLight light = WaterLight::Everywhere);
 
 /// What estimate_water() finds.
 struct WaterEstimate {
@@ -56,8 +63,12 @@ struct WaterEstimate {
 /// Sigma is that of the normal equations, with residuals of one group taken as dependent (Liang and
 /// Zeger 1986, "Longitudinal Data Analysis Using Generalized Linear Models").
 ///
+/// The same with a lamp at the camera counts where it explains the matches better: if it leaves
+/// residuals smaller by a twentieth, and a description of all of them that is shorter by 10 nats,
+/// one residual a group. Its lamp_range is the median range.
+///
 /// Water is found where a channel loses kLeastLoss of the light over the median range, two standard
-/// deviations less taken.
+/// deviations less taken, or a lamp was found.
 /// \throws NumericalError if there are too few matches, or ranges vary too little to tell the
 ///         transmission over the median range to kMostDoubt
 WaterEstimate fit_water(const WaterEvidence& evidence);

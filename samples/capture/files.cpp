@@ -118,6 +118,7 @@ void write_cameras(const std::filesystem::path& folder,
     capture["water"] = {{"attenuation", water->attenuation},
                         {"backscatter", water->backscatter},
                         {"veil", water->veil}};
+    if (water->lamp_range > 0) capture["water"]["lamp_range"] = water->lamp_range;
   }
   write_file(folder / "transforms.json", transforms.dump(1) + "\n");
   write_file(folder / "capture.json", capture.dump(1) + "\n");

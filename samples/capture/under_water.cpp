@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "samples/capture/under_water.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace cgs {
@@ -32,10 +33,13 @@ ColorImage under_water(const ColorImage& picture,
         const auto k = static_cast<size_t>(c);
         double light = water.veil.at(k);
         if (std::isfinite(range)) {
-          light = decoded(double{picture(x, y)[c]}) * std::exp(-water.attenuation.at(k) * range) +
+          const double falloff = water.lamp_range > 0 ? water.lamp_range / range : 1;
+          light = decoded(double{picture(x, y)[c]}) * falloff * falloff *
+                      std::exp(-water.attenuation.at(k) * range) +
                   light * (1 - std::exp(-water.backscatter.at(k) * range));
         }
-        out(x, y)[c] = static_cast<float>(std::round(255 * encoded(light)) / 255);
+        const double code = std::round(255 * encoded(std::min(light, 1.0))) / 255;
+        out(x, y)[c] = static_cast<float>(code);
       }
     }
   }

@@ -9,7 +9,9 @@
 
 #include "io/images/exr.h"
 #include "io/images/image.h"
+#include "io/images/png.h"
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/core/srgb.h"
 #include "libcgs/priors/view_priors.h"
 #include "samples/capture/truth.h"
 #include "samples/capture/under_water.h"
@@ -66,9 +68,8 @@ class UnderWater : public testing::Test {
 };
 test::TempDir* UnderWater::dir_ = nullptr;
 
-TEST_F(UnderWater, IsFoundAsItWas) {
+void expect_as_planted(const json& found) {
   const PlantedWater truth;
-  const json found = read(model() / "training.json")["water"];
   EXPECT_EQ(found["unit"], "m");
   for (size_t c = 0; c < 3; ++c) {
     EXPECT_NEAR(found["attenuation"][c].get<double>() / truth.attenuation.at(c), 1, 0.1) << c;
@@ -76,6 +77,43 @@ TEST_F(UnderWater, IsFoundAsItWas) {
     EXPECT_NEAR(found["veil"][c].get<double>(), truth.veil.at(c), 0.02) << c;
   }
   EXPECT_NE(found["words"].get<std::string>().find("per m"), std::string::npos);
+}
+
+TEST_F(UnderWater, IsFoundAsItWas) {
+  const json found = read(model() / "training.json")["water"];
+  expect_as_planted(found);
+  EXPECT_FALSE(found.contains("lamp_range"));
+}
+
+// The same photographs, lit by a lamp at the camera; restored ones are as that lights them at the
+// range that is stated.
+TEST_F(UnderWater, IsFoundWhereALampLightsIt) {
+  PlantedWater lit;
+  lit.lamp_range = 5;
+  const fs::path scene = *dir_ / "lit";
+  fs::copy(wet(), scene, fs::copy_options::recursive);
+  const PortalScene portal = portal_scene();
+  for (const CaptureView& view : capture_views(2)) {
+    const ColorImage clear = read_image(wet() / "truth" / (view.name + "_clear.png"));
+    write_png(scene / "images" / (view.name + ".png"),
+              under_water(clear, view.camera, exact_depth(portal, view.camera), lit));
+  }
+  ASSERT_EQ(train(scene, *dir_ / "lamp", "--medium water --set steps=0").exit_code, 0);
+  const json found = read(*dir_ / "lamp/training.json")["water"];
+  expect_as_planted(found);
+  const double range = found["lamp_range"];
+  ASSERT_EQ(run_cgs("render " + (*dir_ / "lamp").string() + " -q --views view_02 -o " +
+                    (*dir_ / "lamp_seen").string())
+                .exit_code,
+            0);
+  ColorImage truth = read_image(wet() / "truth/view_02_clear.png");
+  const auto gain = static_cast<float>(lit.lamp_range * lit.lamp_range / (range * range));
+  for (Eigen::Vector3f& color : truth.data) {
+    color = (gain * color.unaryExpr(&linear_from_srgb)).unaryExpr(&srgb_from_linear);
+  }
+  write_png(*dir_ / "truth.png", truth);
+  EXPECT_GT(psnr(*dir_ / "lamp_seen/view_02.restored.png", *dir_ / "truth.png"),
+            psnr(scene / "images/view_02.png", *dir_ / "truth.png") + 3);
 }
 
 TEST_F(UnderWater, IsTakenOutOfPhotographsAndPictures) {

@@ -110,12 +110,18 @@ TEST_F(CamerasJson, KeepsTheWaterThatWasTakenOut) {
   water.backscatter = {0.4, 0.3, 1 / 7.0};
   water.veil = {0.05, 0.2, 1};
   write_cameras_json(path_, scene);
+  EXPECT_FALSE(document()[0]["water"].contains("lamp_range"));
+  EXPECT_EQ(read_cameras_json(path_).water->lamp_range, 0);
+  water.lamp_range = 1 / 0.7;
+  write_cameras_json(path_, scene);
   const Water found = read_cameras_json(path_).water.value();
   EXPECT_EQ(found.attenuation, water.attenuation);
   EXPECT_EQ(found.attenuation_sigma, water.attenuation_sigma);
   EXPECT_EQ(found.backscatter, water.backscatter);
   EXPECT_EQ(found.backscatter_sigma, water.backscatter_sigma);
   EXPECT_EQ(found.veil, water.veil);
+  EXPECT_EQ(found.lamp_range, water.lamp_range);
+  EXPECT_EQ(refused("/0/water/lamp_range", 0), "VALUE");
   EXPECT_EQ(refused("/0/water/veil/0", 1.5), "VALUE");
   EXPECT_EQ(refused("/0/water/attenuation/1", -0.1), "VALUE");
   EXPECT_EQ(refused("/0/water/backscatter", {1, 2}), "SCHEMA");

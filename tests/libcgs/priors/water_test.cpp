@@ -24,6 +24,7 @@ struct Planted {
   double noise = 0;    // of linear light
   double wrong = 0;    // share of matches of two different places
   double strength = 1;
+  double lamp = 0;  // range at which a lamp at the camera is as bright as the light without one
 };
 
 // Surface of any brightness, from 2 to 6 m away.
@@ -33,10 +34,12 @@ WaterEvidence evidence(const Planted& planted) {
   std::normal_distribution<double> normal;
   const auto seen = [&](const Vector3d& light, double range) -> Vector3d {
     Vector3d out;
+    const double falloff = planted.lamp > 0 ? planted.lamp / range : 1;
     for (int c = 0; c < 3; ++c) {
-      out[c] = light[c] * std::exp(-planted.strength * kAttenuation[c] * range) +
-               kVeil[c] * (1 - std::exp(-planted.strength * kBackscatter[c] * range)) +
-               planted.noise * normal(random);
+      out[c] =
+          light[c] * falloff * falloff * std::exp(-planted.strength * kAttenuation[c] * range) +
+          kVeil[c] * (1 - std::exp(-planted.strength * kBackscatter[c] * range)) +
+          planted.noise * normal(random);
     }
     return out;
   };
@@ -63,15 +66,17 @@ TEST(WaterResidual, HasTheDerivativesOfItsValue) {
   const WaterEvidence planted = evidence({.count = 50, .ratio = 2, .noise = 0.01});
   for (const WaterMatch& match : planted.matches) {
     for (int c = 0; c < 3; ++c) {
-      const WaterChannel at{0.3, 0.5, 0.2};
-      const WaterResidual found = water_residual(match, c, at);
-      const double h = 1e-6;
-      const auto value = [&](double a, double b, double v) {
-        return water_residual(match, c, {0.3 + a, 0.5 + b, 0.2 + v}).value;
-      };
-      EXPECT_NEAR(found.gradient.x(), (value(h, 0, 0) - value(-h, 0, 0)) / (2 * h), 1e-8);
-      EXPECT_NEAR(found.gradient.y(), (value(0, h, 0) - value(0, -h, 0)) / (2 * h), 1e-8);
-      EXPECT_NEAR(found.gradient.z(), (value(0, 0, h) - value(0, 0, -h)) / (2 * h), 1e-8);
+      for (const WaterLight light : {WaterLight::Everywhere, WaterLight::Lamp}) {
+        const WaterChannel at{0.3, 0.5, 0.2};
+        const WaterResidual found = water_residual(match, c, at, light);
+        const double h = 1e-6;
+        const auto value = [&](double a, double b, double v) {
+          return water_residual(match, c, {0.3 + a, 0.5 + b, 0.2 + v}, light).value;
+        };
+        EXPECT_NEAR(found.gradient.x(), (value(h, 0, 0) - value(-h, 0, 0)) / (2 * h), 1e-8);
+        EXPECT_NEAR(found.gradient.y(), (value(0, h, 0) - value(0, -h, 0)) / (2 * h), 1e-8);
+        EXPECT_NEAR(found.gradient.z(), (value(0, 0, h) - value(0, 0, -h)) / (2 * h), 1e-8);
+      }
     }
   }
 }
@@ -100,6 +105,32 @@ TEST(FitWater, FindsWhatExactMatchesWereMadeWith) {
     EXPECT_NEAR(found.water->backscatter[c] / kBackscatter[c], 1, 1e-3) << c;
     EXPECT_NEAR(found.water->veil[c], kVeil[c], 1e-4) << c;
   }
+}
+
+TEST(FitWater, TellsALampAtTheCamera) {
+  EXPECT_EQ(fit_water(evidence({})).water->lamp_range, 0);
+  EXPECT_EQ(fit_water(evidence({.count = 20000, .noise = 0.004, .wrong = 0.15})).water->lamp_range,
+            0);
+  for (const double noise : {0.0, 0.002}) {
+    const WaterEstimate found = fit_water(evidence({.noise = noise, .wrong = 0.05, .lamp = 4}));
+    ASSERT_TRUE(found.water) << noise;
+    EXPECT_EQ(found.water->lamp_range, found.range) << noise;
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(found.water->attenuation[c],
+                  kAttenuation[c],
+                  3 * found.water->attenuation_sigma[c] + 2e-3)
+          << c;
+      EXPECT_NEAR(found.water->veil[c], kVeil[c], 3 * found.water->veil_sigma[c] + 2e-3) << c;
+    }
+  }
+}
+
+// In air, too: a flash.
+TEST(FitWater, TellsALampWithoutWater) {
+  const WaterEstimate found = fit_water(evidence({.noise = 0.002, .strength = 0, .lamp = 4}));
+  ASSERT_TRUE(found.water);
+  EXPECT_GT(found.water->lamp_range, 0);
+  EXPECT_LT(found.water->attenuation.maxCoeff(), 0.02);
 }
 
 TEST(FitWater, StandsNoiseAndWrongMatchesWithinThreeSigma) {
