@@ -260,7 +260,11 @@ Json report_json(const Run& run) {
 // What fills the holes of the splats for browsers.
 Gaussians web_fill(const Run& run) {
   if (!result_of(run, Stage::Splats).contains("fill")) return {};
-  return read_web_fill(run.request.output / "web", run.model->scene.frame);
+  try {
+    return read_web_fill(run.request.output / "web", run.model->scene.frame);
+  } catch (const BadInput&) {
+    return {};  // somebody changed the file, which was said
+  }
 }
 
 StageResult run_report(Run& run, const Progress& progress) {
@@ -377,7 +381,8 @@ void remove_all_abandoned_files(const std::filesystem::path& output) {
                              "model/priors",
                              "views",
                              "mesh",
-                             "web"}) {
+                             "web",
+                             "web/surroundings"}) {
     remove_abandoned_files(output / folder);
   }
 }
