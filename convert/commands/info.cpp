@@ -10,11 +10,11 @@
 #include <vector>
 
 #include <nlohmann/json.hpp>
-#include <tbb/parallel_for.h>
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/commands/info_file.h"
+#include "convert/commands/info_photographs.h"
 #include "convert/model/model.h"
 #include "convert/model/views.h"
 #include "convert/scene/baselines.h"
@@ -26,7 +26,6 @@
 #include "io/bytes/scene_path.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
-#include "libcgs/core/photo_quality.h"
 
 namespace cgs {
 
@@ -57,45 +56,6 @@ Json camera_json(const Scene& scene, int index) {
           {"center", vector_to_json(camera.center())},
           {"near", range.near},
           {"far", range.far}};
-}
-
-// Of the views that are used: what a look at their pixels tells, and what is odd about it.
-Json photographs_json(Scene& scene) {
-  std::vector<int> used = scene.input;
-  used.insert(used.end(), scene.held_out.begin(), scene.held_out.end());
-  std::sort(used.begin(), used.end());
-  std::vector<PhotoQuality> quality(used.size());
-  std::vector<std::vector<std::string>> ignored(used.size());  // of odd pixels: training tells
-  tbb::parallel_for(size_t{0}, used.size(), [&](size_t k) {
-    quality[k] = photo_quality(loaded_view(scene, used[k], true, ignored[k]).image);
-  });
-  const std::vector<PhotoFlaws> flaws = photo_flaws(quality);
-  Json out = Json::array();
-  for (size_t k = 0; k < used.size(); ++k) {
-    const std::string& name = scene.views[static_cast<size_t>(used[k])].name;
-    out.push_back({{"name", name},
-                   {"blur", quality[k].blur},
-                   {"stops", flaws[k].stops},
-                   {"burnt", quality[k].burnt},
-                   {"black", quality[k].black}});
-    const std::string photograph = "photograph " + printable(name) + " is ";
-    if (flaws[k].is_blurred) {
-      scene.warnings.push_back(
-          photograph + "blurred beside the others (" + number(quality[k].blur, "%.2f") +
-          " of its contrast stays when it is blurred once more): leave it out, "
-          "or take it again with a steadier hand");
-    }
-    if (flaws[k].is_off_exposure) {
-      scene.warnings.push_back(photograph + number(std::abs(flaws[k].stops), "%.1f") + " stops " +
-                               (flaws[k].stops > 0 ? "brighter" : "darker") +
-                               " than the others: lock the exposure of the camera");
-    }
-    if (flaws[k].is_burnt) {
-      scene.warnings.push_back(photograph + "burnt out on " + percent(quality[k].burnt) +
-                               " of its pixels, which show no texture to measure");
-    }
-  }
-  return out;
 }
 
 Json baselines_json(const Scene& scene) {
@@ -134,7 +94,10 @@ Json depth_json(const Scene& scene) {
           {"scale", scene.depth_scale}};
 }
 
-Json scene_json(const OpenedScene& opened, const Json& fit, const Json& photographs) {
+Json scene_json(const OpenedScene& opened,
+                const Json& fit,
+                const Json& photographs,
+                const Json& coarse) {
   const Scene& scene = opened.scene;
   Json cameras = Json::array();
   for (int i = 0; i < static_cast<int>(scene.views.size()); ++i) {
@@ -156,6 +119,7 @@ Json scene_json(const OpenedScene& opened, const Json& fit, const Json& photogra
           {"baselines", baselines_json(scene)},
           {"depth_files", depth_json(scene)},
           {"photographs", photographs},
+          {"coarse_depth", coarse},
           {"camera_fit", fit},
           {"refined_poses", opened.refined ? refinement_to_json(opened.refined->report) : Json()},
           {"missing", scene.missing},
@@ -185,19 +149,6 @@ void print_fit(const Json& info) {
         view["distance"].get<double>(),
         number(view["error_before"], "%.2f").c_str(),
         number(view["error_after"], "%.2f").c_str());
-  }
-}
-
-void print_photographs(const Json& photographs) {
-  if (photographs.empty()) return;
-  std::printf("\nphotographs:             blur  exposure     burnt     black\n");
-  for (const Json& row : photographs) {
-    std::printf("  %-22s %4.2f %+9.2f %9s %9s\n",
-                one_line(row["name"].get<std::string>()).c_str(),
-                row["blur"].get<double>(),
-                row["stops"].get<double>(),
-                percent(row["burnt"].get<double>()).c_str(),
-                percent(row["black"].get<double>()).c_str());
   }
 }
 
@@ -287,7 +238,7 @@ void print_scene(const Json& info) {
                 kind == "auto" ? "of a kind that training finds out" : kind.c_str());
   }
   print_fit(info);
-  print_photographs(info["photographs"]);
+  print_photographs(info["photographs"], info["coarse_depth"]);
   for (const Json& name : info["missing"]) {
     std::printf("missing: %s\n", one_line(name.get<std::string>()).c_str());
   }
@@ -337,9 +288,12 @@ Json tell_scene(const InfoArgs& args) {
     return camera_fit_to_json(check_stated_cameras(opened, quiet));
   });
   const Json photographs = told_or_warned(opened.scene, "how the photographs were taken", [&] {
-    return photographs_json(opened.scene);
+    return photographs_to_json(opened.scene);
   });
-  Json info = scene_json(opened, fit, photographs);
+  const Json coarse = told_or_warned(opened.scene, "what of them can be measured", [&] {
+    return coarse_depth_to_json(opened.scene, terminal);
+  });
+  Json info = scene_json(opened, fit, photographs, coarse);
   if (args.json) {
     print_report(info);
   } else {
@@ -381,7 +335,9 @@ void add_info(CLI::App& app) {
       "         cgs info part.stl\n"
       "Of photographs, blur is the share of contrast that stays when one is blurred once more "
       "(0.2\n"
-      "to 0.4: sharp), exposure is in stops beside their median, burnt and black are clipped.");
+      "to 0.4: sharp), exposure is in stops beside their median, burnt and black are clipped;\n"
+      "measured is what two or more small pictures agree on, moving what stood elsewhere in the\n"
+      "others, which three can tell.");
   cmd->callback([args, cmd] {
     refuse_for_others(*cmd, args->scene.path);
     run_info(*args);

@@ -115,8 +115,8 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
   const Raster<uint8_t> origin = as_bytes(image, "origin.Y", file);
   priors.origin = Raster<DepthOrigin>(image.width, image.height, DepthOrigin::Unknown);
   std::transform(origin.data.begin(), origin.data.end(), priors.origin.data.begin(), [](uint8_t v) {
-    return v > static_cast<uint8_t>(DepthOrigin::Background) ? DepthOrigin::Unknown
-                                                             : static_cast<DepthOrigin>(v);
+    return v > static_cast<uint8_t>(DepthOrigin::Continued) ? DepthOrigin::Unknown
+                                                            : static_cast<DepthOrigin>(v);
   });
   return priors;
 }

@@ -250,7 +250,8 @@ std::vector<RequestField> all_fields() {
       asked("views", Stage::Report, in_options(&SceneOptions::views)),
       asked("downscale", Stage::Model, in_options(&SceneOptions::downscale)),
       stating_scale(asked("assume_unit", Stage::Scale, in_scene(&SceneRequest::assume_unit))),
-      asked("up", Stage::Scale, in_scene(&SceneRequest::up)),
+      // Level ground is looked for in the depth of the photographs, and goes on there.
+      asked("up", Stage::Model, in_scene(&SceneRequest::up)),
       asked("known_distances", Stage::Scale, in_scene(&SceneRequest::known_distances)),
       asked("marker_size", Stage::Scale, in_scene(&SceneRequest::marker_size)),
       asked("training", Stage::Model, &RunRequest::training),

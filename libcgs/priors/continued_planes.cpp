@@ -195,7 +195,7 @@ void enter(const Continuation& continuation,
       if (!(depth > 0)) continue;
       priors.depth(x, y) = depth;
       priors.sigma(x, y) = filled_sigma(0, way, sigma_per_pixel) * depth;
-      origin = DepthOrigin::Estimated;
+      origin = DepthOrigin::Continued;
     }
   });
 }

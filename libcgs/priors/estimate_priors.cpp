@@ -45,7 +45,9 @@ PriorsCoverage coverage(const Raster<DepthOrigin>& before,
   out.sky = count(origin, DepthOrigin::Sky) / valid;
   out.transient = usable(before, DepthOrigin::Transient, view) / valid;
   out.background = usable(before, DepthOrigin::Background, view) / valid;
-  out.estimated = count(after.data, DepthOrigin::Estimated) / valid;
+  out.estimated =
+      static_cast<double>(std::count_if(after.data.begin(), after.data.end(), is_estimated)) /
+      valid;
   out.left_open = std::max(0.0, 1 - out.measured - out.completed - out.guessed - out.no_surface());
   return out;
 }
@@ -129,7 +131,7 @@ class Estimator {
       ViewPriors& priors = out_.views[i];
       for (size_t k = 0; k < filled[i].data.size(); ++k) {
         const bool is_continued = filled[i].data[k] == DepthOrigin::Unknown &&
-                                  priors.origin.data[k] == DepthOrigin::Estimated;
+                                  priors.origin.data[k] == DepthOrigin::Continued;
         if (is_continued) filled[i].data[k] = DepthOrigin::Completed;
       }
       out_.report.coverage.push_back(coverage(filled[i], priors.origin, view(i)));

@@ -168,7 +168,7 @@ EstimatedPatch estimated_patch(const ViewPriors& priors, int x0, int y0, MaskMap
       const bool is_open = there == DepthOrigin::Unknown || shows_no_surface(there);
       const bool goes_on =
           !is_open && depth_step(priors.depth(x, y), priors.depth(u, v)) <= kOneSurface;
-      if (goes_on && there == DepthOrigin::Estimated) {
+      if (goes_on && is_estimated(there)) {
         if (left(u, v) != 0) out.pixels.emplace_back(u, v);
         left(u, v) = 0;
         continue;
@@ -192,7 +192,7 @@ MaskMap framed_estimates(const ViewPriors& priors) {
   MaskMap out(priors.origin.width, priors.origin.height, 0);
   MaskMap left = out;
   std::transform(origins.begin(), origins.end(), left.data.begin(), [](DepthOrigin origin) {
-    return origin == DepthOrigin::Estimated ? 1 : 0;
+    return is_estimated(origin) ? 1 : 0;
   });
   for (int y = 0; y < out.height; ++y) {
     for (int x = 0; x < out.width; ++x) {

@@ -20,11 +20,16 @@ enum class DepthOrigin : uint8_t {
                    ///< fitted to the measured pixels.
   Sky = 4,         ///< No surface; depth is that of a backdrop for pictures.
   Estimated = 5,   ///< Completed or Guessed, but not a small way from a measured pixel of the same
-                   ///< surface (mark_estimated()), or on a plane that goes on (continue_planes()):
-                   ///< nothing tells whether it is right.
+                   ///< surface (mark_estimated()): nothing tells whether it is right.
   Transient = 6,   ///< No depth: something that the other photographs do not show in its place.
   Background = 7,  ///< No depth: around an object that stands alone (see mark_background()).
+  Continued = 8,   ///< On ground or a wall that goes on (continue_planes()): estimated, too.
 };
+
+/// Whether a pixel has a depth of which nothing tells whether it is right.
+constexpr bool is_estimated(DepthOrigin origin) {
+  return origin == DepthOrigin::Estimated || origin == DepthOrigin::Continued;
+}
 
 /// Whether a pixel shows no surface of the scene, so that none is to be filled in.
 constexpr bool shows_no_surface(DepthOrigin origin) {
@@ -42,6 +47,7 @@ inline DepthEvidence depth_evidence(DepthOrigin origin) {
     case DepthOrigin::Sky:
       return DepthEvidence::Sky;
     case DepthOrigin::Estimated:
+    case DepthOrigin::Continued:
       return DepthEvidence::Estimated;
     default:
       return DepthEvidence::Measured;

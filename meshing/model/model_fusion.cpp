@@ -12,7 +12,6 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/priors/estimated_depth.h"
-#include "libcgs/priors/measured_planes.h"
 #include "libcgs/render/picture.h"
 #include "libcgs/render/rasterizer.h"
 
@@ -20,40 +19,22 @@ namespace cgs {
 
 namespace {
 
-using Planes = std::vector<MeasuredPlane>;
-
-// Ground and walls that estimated surface may lie on, where that is asked for.
-Planes planes_of(const Model& model, EstimatedSurface wanted) {
-  if (wanted != EstimatedSurface::FillOnly) return {};
-  return measured_planes(model.scene, model.priors);
-}
-
 // 1 where estimated surface is wanted.
-MaskMap wanted_estimates(const Camera& camera,
-                         const ViewPriors& priors,
-                         EstimatedSurface wanted,
-                         const Planes& planes) {
+MaskMap wanted_estimates(const ViewPriors& priors, EstimatedSurface wanted) {
   const auto& origin = priors.origin;
   const bool is_kept = wanted == EstimatedSurface::Keep;
   if (wanted != EstimatedSurface::FillOnly) return MaskMap(origin.width, origin.height, is_kept);
   MaskMap out = framed_estimates(priors);
-  for (int y = 0; y < origin.height; ++y) {
-    for (int x = 0; x < origin.width; ++x) {
-      if (origin(x, y) != DepthOrigin::Estimated || out(x, y) != 0) continue;
-      const double depth = double{priors.depth(x, y)};
-      out(x, y) = plane_of(planes, camera, x, y, depth) < planes.size() ? 1 : 0;
-    }
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    if (origin.data[i] == DepthOrigin::Continued) out.data[i] = 1;
   }
   return out;
 }
 
 // Depth as fusion takes it: none where estimated surface is not wanted, infinite at sky and around
 // an object that stands alone.
-void settle_depth(const ViewPriors& priors,
-                  EstimatedSurface wanted,
-                  const Planes& planes,
-                  TsdfView& view) {
-  const MaskMap is_wanted = wanted_estimates(view.camera, priors, wanted, planes);
+void settle_depth(const ViewPriors& priors, EstimatedSurface wanted, TsdfView& view) {
+  const MaskMap is_wanted = wanted_estimates(priors, wanted);
   for (size_t i = 0; i < view.depth.data.size(); ++i) {
     const DepthEvidence evidence = view.evidence.data[i];
     const bool is_background = priors.origin.data[i] == DepthOrigin::Background;
@@ -67,18 +48,14 @@ void settle_depth(const ViewPriors& priors,
 }
 
 // What an input view of a model sees.
-TsdfView seen_by_input(const Model& model,
-                       size_t k,
-                       EstimatedSurface estimated,
-                       const Planes& planes,
-                       bool with_color) {
+TsdfView seen_by_input(const Model& model, size_t k, EstimatedSurface estimated, bool with_color) {
   TsdfView view;
   view.camera = input_camera(model, k);
   view.depth = model.priors[k].depth;
   view.sigma = model.priors[k].sigma;
   view.evidence = evidence_of(model.priors[k]);
   if (with_color) view.color = picture(rasterize(model.gaussians, view.camera));
-  settle_depth(model.priors[k], estimated, planes, view);
+  settle_depth(model.priors[k], estimated, view);
   return view;
 }
 
@@ -197,10 +174,9 @@ FusedVolume fuse_model(const Model& model, const ModelFusion& request, const Pro
   size_t pixels = 0;
   for (const ViewPriors& priors : model.priors) pixels += priors.depth.data.size();
   check_view_memory(pixels, request.memory_limit);
-  const Planes planes = planes_of(model, request.estimated);
   std::vector<TsdfView> views;
   for (size_t k = 0; k < model.scene.input.size(); ++k) {
-    views.push_back(seen_by_input(model, k, request.estimated, planes, true));
+    views.push_back(seen_by_input(model, k, request.estimated, true));
   }
   return fuse(views, tsdf_options(request), progress);
 }
@@ -212,11 +188,9 @@ JoinedVolume fuse_models(const ModelSource& source,
   JoinedVolume out;
   ModelShelf shelf(source);
   std::vector<Witness> witnesses;
-  std::vector<Planes> planes;  // of each model
   for (size_t i = 0; i < source.count; ++i) {
     const auto held = shelf(i);
     const Model& model = *held->model;
-    planes.push_back(planes_of(model, request.estimated));
     const Frame& frame = model.scene.frame;
     if (i == 0) out.frame = frame;
     check_units(out.frame, frame, i);
@@ -234,15 +208,14 @@ JoinedVolume fuse_models(const ModelSource& source,
   out.photographs = witnesses.size();
   out.in_several = static_cast<size_t>(std::count_if(
       witnesses.begin(), witnesses.end(), [](const Witness& w) { return w.is_in_several; }));
-  const TsdfSource views = {
-      witnesses.size(), [&](size_t i, bool with_color) {
-        const Witness& witness = witnesses[i];
-        const auto held = shelf(witness.model);
-        TsdfView view = seen_by_input(
-            *held->model, witness.input, request.estimated, planes[witness.model], with_color);
-        move_to_frame(held->model->scene.frame, out.frame, view);
-        return view;
-      }};
+  const TsdfSource views = {witnesses.size(), [&](size_t i, bool with_color) {
+                              const Witness& witness = witnesses[i];
+                              const auto held = shelf(witness.model);
+                              TsdfView view = seen_by_input(
+                                  *held->model, witness.input, request.estimated, with_color);
+                              move_to_frame(held->model->scene.frame, out.frame, view);
+                              return view;
+                            }};
   out.fused = fuse_streamed(views, tsdf_options(request), part_of(progress, 0.1, 1));
   return out;
 }

@@ -15,8 +15,8 @@ namespace cgs {
 /// Which estimated surface goes into a volume, and so into the meshes made of it.
 enum class EstimatedSurface {
   Keep,      ///< All.
-  FillOnly,  ///< Where it is small and framed by evidence, see framed_estimates(), or lies on
-             ///< measured_planes().
+  FillOnly,  ///< Where it is small and framed by evidence, see framed_estimates(), or ground or a
+             ///< wall that goes on, see continue_planes().
   Drop       ///< None.
 };
 

@@ -2,13 +2,20 @@
 // The portal with people walking before it, who stand elsewhere in each photograph.
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include "io/images/png.h"
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/estimate_priors.h"
 #include "tests/support/portal_capture.h"
+#include "tests/support/run_cgs.h"
+#include "tests/support/temp_dir.h"
 
 namespace cgs::e2e_transients_test {
 namespace {
@@ -109,6 +116,38 @@ TEST(Transients, AreLeftOutOfThePortalAndChangeNoDepth) {
                 double(found + more) / double(walkers[i].data.size()),
                 1e-9);
   }
+}
+
+/// The portal's photographs in a folder, with walkers painted over the three first.
+/// \return the share of each picture that they cover
+std::vector<double> write_walkers(const std::filesystem::path& folder) {
+  std::filesystem::copy(test::portal_capture(2), folder, std::filesystem::copy_options::recursive);
+  Scene scene = portal();
+  std::vector<double> out;
+  for (const MaskMap& mask : let_walk(scene)) {
+    const View& view = scene.views[static_cast<size_t>(scene.input[out.size()])];
+    write_png(folder / std::filesystem::relative(view.image_path, scene.folder), view.image);
+    const auto covered = std::count(mask.data.begin(), mask.data.end(), 1);
+    out.push_back(double(covered) / double(mask.data.size()));
+  }
+  return out;
+}
+
+TEST(Transients, AreToldOfPhotographsThatAreNotUsedYet) {
+  const test::TempDir dir;
+  const std::vector<double> painted = write_walkers(dir / "photos");
+  const std::string info = "info " + (dir / "photos").string() + " --json --views view_01,view_02";
+  const auto three = nlohmann::json::parse(test::run_cgs(info + ",view_03").out);
+  ASSERT_EQ(three["coarse_depth"].size(), painted.size());
+  for (size_t k = 0; k < painted.size(); ++k) {
+    const auto& photograph = three["coarse_depth"][k];
+    EXPECT_GT(photograph["moving"].get<double>(), 0.9 * painted[k]);
+    EXPECT_LT(photograph["moving"].get<double>(), 1.8 * painted[k]) << "with rims";
+    EXPECT_GT(photograph["measured"].get<double>(), 0.6);
+  }
+  const auto two = nlohmann::json::parse(test::run_cgs(info).out);
+  EXPECT_TRUE(two["coarse_depth"][0]["moving"].is_null()) << "which of them is right, nobody knows";
+  EXPECT_GT(two["coarse_depth"][0]["measured"].get<double>(), 0.6);
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ Result result_of(const MeasuredPatches& scene, size_t v) {
     const DepthOrigin origin = scene.priors[v].origin.data[i];
     if (origin == DepthOrigin::Measured || origin == DepthOrigin::Sky) continue;
     ++open;
-    if (origin != DepthOrigin::Estimated) continue;
+    if (origin != DepthOrigin::Continued) continue;
     ++filled;
     const double ratio = double{scene.priors[v].depth.data[i] / scene.truth[v].data[i]};
     wrong += std::abs(ratio - 1) > 0.02 ? 1 : 0;
@@ -78,7 +78,7 @@ TEST(ContinuePlanes, ReplacesWhatWasEstimatedAndKeepsWhatAdjoinsMeasuredPixels) 
   priors.depth(60, 85) = priors.depth(62, 85) = 10;
   continue_all(street);
   EXPECT_NEAR(priors.depth(60, 85), street.truth[0](60, 85), 0.05);
-  EXPECT_EQ(priors.origin(60, 85), DepthOrigin::Estimated);
+  EXPECT_EQ(priors.origin(60, 85), DepthOrigin::Continued);
   EXPECT_EQ(priors.depth(62, 85), 10);
   EXPECT_EQ(priors.origin(62, 85), DepthOrigin::Completed);
 }
@@ -90,7 +90,7 @@ TEST(ContinuePlanes, LeavesMaskedPixels) {
   street.scene.views[0].valid(60, 85) = 0;
   continue_all(street);
   EXPECT_EQ(street.priors[0].origin(60, 85), DepthOrigin::Unknown);
-  EXPECT_EQ(street.priors[0].origin(62, 85), DepthOrigin::Estimated);
+  EXPECT_EQ(street.priors[0].origin(62, 85), DepthOrigin::Continued);
 }
 
 // What of a box is not measured is not the ground that would be behind it.
@@ -119,7 +119,7 @@ TEST(ContinuePlanes, EndsWhereSomethingBehindWasMeasured) {
   EXPECT_GE(continue_all(street), 2);
   const ViewPriors& priors = street.priors[0];
   for (int x = 11; x < 16; ++x) {
-    const bool is_wall = priors.origin(x, 45) == DepthOrigin::Estimated &&
+    const bool is_wall = priors.origin(x, 45) == DepthOrigin::Continued &&
                          std::abs(priors.depth(x, 45) * float(60 - x) / 80 - 2) < 0.1f;
     EXPECT_FALSE(is_wall) << x;
   }
@@ -142,7 +142,7 @@ TEST(ContinuePlanes, EndsWhereAnotherViewSeesPast) {
       }
     }
     EXPECT_GE(continue_all(scene), 1);
-    const bool is_filled = scene.priors[0].origin(60, 45) == DepthOrigin::Estimated;
+    const bool is_filled = scene.priors[0].origin(60, 45) == DepthOrigin::Continued;
     EXPECT_EQ(is_filled, origin == DepthOrigin::Unknown);
   }
 }

@@ -72,7 +72,7 @@ TEST(EstimatePriors, TellsSharesThatAddUpToAllOfAView) {
     EXPECT_GT(share.measured, 0.3);
     EXPECT_LE(share.estimated, share.completed + share.guessed + 1e-9);
     const auto& origin = priors.views[v].origin.data;
-    const auto estimated = std::count(origin.begin(), origin.end(), DepthOrigin::Estimated);
+    const auto estimated = std::count_if(origin.begin(), origin.end(), is_estimated);
     EXPECT_NEAR(share.estimated, double(estimated) / (79 * 60), 1e-9);
     EXPECT_EQ(priors.views[v].origin(40, 4), DepthOrigin::Sky);
     EXPECT_GT(priors.views[v].depth(40, 4), priors.views[v].depth(40, 30));
