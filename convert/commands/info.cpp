@@ -291,7 +291,7 @@ Json tell_scene(const InfoArgs& args) {
     return photographs_to_json(opened.scene);
   });
   const Json coarse = told_or_warned(opened.scene, "what of them can be measured", [&] {
-    return coarse_depth_to_json(opened.scene, terminal);
+    return coarse_depth_to_json(opened.scene);
   });
   Json info = scene_json(opened, fit, photographs, coarse);
   if (args.json) {

@@ -11,7 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "convert/text/html.h"
-#include "convert/text/report_json.h"
+#include "convert/text/terminal.h"
 #include "io/bytes/scene_path.h"
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
@@ -82,27 +82,21 @@ Json photographs_to_json(Scene& scene) {
   return out;
 }
 
-Json coarse_depth_to_json(const Scene& scene, Terminal& terminal) {
+Json coarse_depth_to_json(const Scene& scene) {
   if (scene.input.size() < 2) return nullptr;
-  const Scene small = small_inputs(scene);
-  Json out = Json::array();
+  std::vector<PriorsCoverage> shares(scene.input.size());  // where nothing is measured, of nothing
   try {
-    const EstimatedPriors priors = estimate_priors(small, {}, terminal.begin("a coarse depth"));
-    for (size_t k = 0; k < scene.input.size(); ++k) {
-      const PriorsCoverage& share = priors.report.coverage[k];
-      const bool is_told = scene.input.size() > 2;
-      out.push_back({{"view", scene.views[static_cast<size_t>(scene.input[k])].name},
-                     {"measured", share.measured},
-                     {"moving", is_told ? Json(share.transient) : Json()}});
-    }
-    (void)terminal.end("");
+    Terminal quiet(true);
+    const Progress until_interrupted = quiet.begin("a coarse depth");
+    shares = estimate_priors(small_inputs(scene), {}, until_interrupted).report.coverage;
   } catch (const NumericalError&) {
-    (void)terminal.end("nothing of any photograph is measured");
-    for (const int view : scene.input) {
-      out.push_back({{"view", scene.views[static_cast<size_t>(view)].name},
-                     {"measured", 0.0},
-                     {"moving", nullptr}});
-    }
+  }
+  Json out = Json::array();
+  for (size_t k = 0; k < shares.size(); ++k) {
+    const bool is_told = shares.size() > 2;
+    out.push_back({{"view", scene.views[static_cast<size_t>(scene.input[k])].name},
+                   {"measured", shares[k].measured},
+                   {"moving", is_told ? Json(shares[k].transient) : Json()}});
   }
   return out;
 }

@@ -3,7 +3,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/text/terminal.h"
 #include "libcgs/core/scene.h"
 
 namespace cgs {
@@ -15,8 +14,8 @@ nlohmann::ordered_json photographs_to_json(Scene& scene);
 
 /// What a sweep of small pictures tells of each input view: the share that is measured, and that
 /// which moved; null of fewer than two.
-/// \throws Error as loaded_view() and estimate_priors(), but where nothing is measured
-nlohmann::ordered_json coarse_depth_to_json(const Scene& scene, Terminal& terminal);
+/// \throws Error as loaded_view() and estimate_priors(), but 0 where nothing is measured
+nlohmann::ordered_json coarse_depth_to_json(const Scene& scene);
 
 /// A line for each photograph.
 /// \param coarse_depth  may be null
