@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -287,12 +286,15 @@ Json tell_scene(const InfoArgs& args) {
     Terminal quiet(true);
     return camera_fit_to_json(check_stated_cameras(opened, quiet));
   });
+  Scene small;
   const Json photographs = told_or_warned(opened.scene, "how the photographs were taken", [&] {
-    return photographs_to_json(opened.scene);
+    return photographs_to_json(opened.scene, small);
   });
-  const Json coarse = told_or_warned(opened.scene, "what of them can be measured", [&] {
-    return coarse_depth_to_json(opened.scene);
-  });
+  Json coarse;
+  if (!photographs.is_null()) {
+    coarse = told_or_warned(
+        opened.scene, "what of them can be measured", [&] { return coarse_depth_to_json(small); });
+  }
   Json info = scene_json(opened, fit, photographs, coarse);
   if (args.json) {
     print_report(info);

@@ -25,33 +25,27 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-// The input views of a scene alone, with pictures so small that a sweep of them takes a second.
-Scene small_inputs(const Scene& scene) {
+// So small that a sweep takes a second.
+View for_sweep(View view) {
   constexpr int kSide = 256;  // [pixels], about
-  Scene out = scene;
-  out.cache.reset();
-  out.held_out.clear();
-  tbb::parallel_for(size_t{0}, scene.input.size(), [&](size_t k) {
-    std::vector<std::string> ignored;  // of odd pixels: training tells
-    View view = loaded_view(scene, scene.input[k], true, ignored);
-    view.given_depth = {};  // of another size, and what photographs measure is asked
-    const int side = std::max(view.camera.width, view.camera.height);
-    out.views[static_cast<size_t>(scene.input[k])] =
-        reduced_view(view, std::max(1, (side + kSide / 2) / kSide));
-  });
-  return out;
+  view.given_depth = {};      // of another size, and what photographs measure is asked
+  return reduced_view(view, reduction_to(kSide, std::max(view.camera.width, view.camera.height)));
 }
 
 }  // namespace
 
-Json photographs_to_json(Scene& scene) {
+Json photographs_to_json(Scene& scene, Scene& small) {
   std::vector<int> used = scene.input;
   used.insert(used.end(), scene.held_out.begin(), scene.held_out.end());
   std::sort(used.begin(), used.end());
   std::vector<PhotoQuality> quality(used.size());
   std::vector<std::vector<std::string>> ignored(used.size());  // of odd pixels: training tells
+  small = scene;
   tbb::parallel_for(size_t{0}, used.size(), [&](size_t k) {
-    quality[k] = photo_quality(loaded_view(scene, used[k], true, ignored[k]).image);
+    View view = loaded_view(scene, used[k], true, ignored[k]);
+    quality[k] = photo_quality(view.image);
+    const bool is_input = std::count(scene.input.begin(), scene.input.end(), used[k]) > 0;
+    if (is_input) small.views[static_cast<size_t>(used[k])] = for_sweep(std::move(view));
   });
   const std::vector<PhotoFlaws> flaws = photo_flaws(quality);
   Json out = Json::array();
@@ -82,19 +76,18 @@ Json photographs_to_json(Scene& scene) {
   return out;
 }
 
-Json coarse_depth_to_json(const Scene& scene) {
-  if (scene.input.size() < 2) return nullptr;
-  std::vector<PriorsCoverage> shares(scene.input.size());  // where nothing is measured, of nothing
+Json coarse_depth_to_json(const Scene& small) {
+  if (small.input.size() < 2) return nullptr;
+  std::vector<PriorsCoverage> shares(small.input.size());  // where nothing is measured, of nothing
   try {
     Terminal quiet(true);
-    const Progress until_interrupted = quiet.begin("a coarse depth");
-    shares = estimate_priors(small_inputs(scene), {}, until_interrupted).report.coverage;
+    shares = estimate_priors(small, {}, quiet.begin("a coarse depth")).report.coverage;
   } catch (const NumericalError&) {
   }
   Json out = Json::array();
   for (size_t k = 0; k < shares.size(); ++k) {
     const bool is_told = shares.size() > 2;
-    out.push_back({{"view", scene.views[static_cast<size_t>(scene.input[k])].name},
+    out.push_back({{"view", small.views[static_cast<size_t>(small.input[k])].name},
                    {"measured", shares[k].measured},
                    {"moving", is_told ? Json(shares[k].transient) : Json()}});
   }

@@ -9,13 +9,15 @@ namespace cgs {
 
 /// What a look at the pixels of each view that is used tells: blur, exposure, and what is clipped.
 /// What is odd about it becomes a warning of the scene.
+/// \param small  becomes the scene with the input views loaded, of some 256 pixels
 /// \throws Error as loaded_view()
-nlohmann::ordered_json photographs_to_json(Scene& scene);
+nlohmann::ordered_json photographs_to_json(Scene& scene, Scene& small);
 
-/// What a sweep of small pictures tells of each input view: the share that is measured, and that
-/// which moved; null of fewer than two.
-/// \throws Error as loaded_view() and estimate_priors(), but 0 where nothing is measured
-nlohmann::ordered_json coarse_depth_to_json(const Scene& scene);
+/// What a sweep tells of each input view: the share that is measured, and that which moved; null of
+/// fewer than two.
+/// \param small  of photographs_to_json()
+/// \throws Error as estimate_priors(), but 0 where nothing is measured
+nlohmann::ordered_json coarse_depth_to_json(const Scene& small);
 
 /// A line for each photograph.
 /// \param coarse_depth  may be null

@@ -16,6 +16,7 @@
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/scene_path.h"
 #include "libcgs/core/error.h"
+#include "libcgs/priors/reduced_view.h"
 
 namespace cgs {
 
@@ -36,9 +37,7 @@ int longest_side(const Scene& scene) {
   return out;
 }
 
-int preview_reduction(const Scene& full) {
-  return std::max(1, (longest_side(full) + kPreviewSide / 2) / kPreviewSide);
-}
+int preview_reduction(const Scene& full) { return reduction_to(kPreviewSide, longest_side(full)); }
 
 // Of the same views.
 RunRequest preview_request(const RunRequest& request,

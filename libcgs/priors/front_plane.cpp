@@ -33,7 +33,7 @@ int reduction(const std::vector<ColorImage>& images) {
   constexpr int kLongestSide = 256;
   int longest = 0;
   for (const ColorImage& image : images) longest = std::max({longest, image.width, image.height});
-  return std::max(1, (longest + kLongestSide / 2) / kLongestSide);
+  return reduction_to(kLongestSide, longest);
 }
 
 // What is left of the photographs, as small photographs.

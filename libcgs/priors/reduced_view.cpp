@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/reduced_view.h"
 
+#include <algorithm>
+
 namespace cgs {
+
+int reduction_to(int wanted, int longest) { return std::max(1, (longest + wanted / 2) / wanted); }
 
 View reduced_view(const View& view, int factor) {
   View out = view;

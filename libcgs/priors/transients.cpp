@@ -137,7 +137,7 @@ class Transients {
     for (size_t i = 0; i < priors.size(); ++i) {
       const View& view = scene.views[static_cast<size_t>(scene.input[i])];
       const int side = std::max(view.image.width, view.image.height);
-      factor_.push_back(std::max(1, (side + kWorkingSide / 2) / kWorkingSide));
+      factor_.push_back(reduction_to(kWorkingSide, side));
       View small = reduced_view(view, factor_.back());
       apply_gain(small.image, exposure.gain[i]);
       views_.push_back({small.camera,

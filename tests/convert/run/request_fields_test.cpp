@@ -112,6 +112,7 @@ TEST(DecidedStages, AreAllForWhatStatesTheScaleOfGivenDepth) {
   EXPECT_EQ(plain.count("training"), 0u);
   request.scene.options.depth.network = "network.onnx";
   const auto with_depth = decided_stages(request, {});
+  EXPECT_EQ(with_depth.count("up"), 0u);
   for (const char* key : {"assume_unit", "control_points", "stated_scale"}) {
     EXPECT_EQ(plain.at(key), "scale");
     EXPECT_EQ(with_depth.count(key), 0u) << key;

@@ -25,5 +25,12 @@ TEST(ReducedView, AveragesPixelsAndKeepsTheRays) {
   EXPECT_EQ(half.camera.ray_in_cam(1, 1), view.camera.ray_in_cam(2, 2));
 }
 
+TEST(ReductionTo, IsTheNearestWholeOne) {
+  EXPECT_EQ(reduction_to(256, 100), 1);
+  EXPECT_EQ(reduction_to(256, 383), 1);
+  EXPECT_EQ(reduction_to(256, 384), 2);
+  EXPECT_EQ(reduction_to(256, 1002), 4);
+}
+
 }  // namespace
 }  // namespace cgs::reduced_view_test

@@ -93,16 +93,25 @@ TEST(FuseModel, TakesEstimatedSurfaceAsItIsTold) {
 
 TEST(FuseModel, FillsWallsThatGoOn) {
   Model model = plane_below_sky();
+  Model beside = model;
   for (ViewPriors& priors : model.priors) {
     for (DepthOrigin& origin : priors.origin.data) {
       if (origin == DepthOrigin::Estimated) origin = DepthOrigin::Continued;
     }
   }
-  const auto fused = [&](EstimatedSurface estimated) {
-    return fuse_model(model, {.voxel_size = 0, .estimated = estimated}, {}).volume;
+  const auto fused = [](const Model& of, EstimatedSurface estimated) {
+    return fuse_model(of, {.voxel_size = 0, .estimated = estimated}, {}).volume;
   };
-  EXPECT_EQ(state_at(fused(EstimatedSurface::FillOnly), kAtBorder), VoxelState::Estimated);
-  EXPECT_FALSE(has_surface(fused(EstimatedSurface::Drop), kAtBorder));
+  EXPECT_EQ(state_at(fused(model, EstimatedSurface::FillOnly), kAtBorder), VoxelState::Estimated);
+  EXPECT_FALSE(has_surface(fused(model, EstimatedSurface::Drop), kAtBorder));
+  for (ViewPriors& priors : beside.priors) {
+    for (size_t i = 0; i < priors.depth.data.size(); ++i) {
+      if (priors.origin.data[i] == DepthOrigin::Estimated) priors.depth.data[i] *= 0.9f;
+    }
+  }
+  const Volume without = fused(beside, EstimatedSurface::FillOnly);
+  EXPECT_FALSE(has_surface(without, kAtBorder));
+  EXPECT_FALSE(has_surface(without, 0.9 * kAtBorder - Vector3d(0, 0, 0.1)));
 }
 
 TEST(FuseModel, CountsEstimatedVoxels) {
